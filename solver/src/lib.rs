@@ -3,6 +3,16 @@
 //! Deterministic: the same input and seed give the same bytes at any thread count. No files, no GPU, no clock,
 //! no environment, no printing.
 
+pub mod bake;
+pub mod candidates;
+pub mod lights;
 pub mod mesh;
+pub mod metrics;
 pub mod plane;
+pub mod receivers;
+pub mod rectangle;
+pub mod sampling;
+pub mod selection;
 pub mod shade;
+pub mod visibility;
+pub mod votes;

@@ -1,0 +1,232 @@
+//! Votes: what the pairs say about each texel of a plane.
+//!
+//! A pair's ray crosses the plane in one texel. Summing signed votes per texel gives, in one pass over the pairs,
+//! the best binary texture (block where the sum is positive) and the exact drop of the error that it brings (the
+//! sum of the positive sums). This loop is where a search spends its time: the affine rows of `shade::plane_rows`
+//! make texels of a whole block of pairs a few vector operations; only the scatter is scalar.
+
+use crate::{
+    plane::{ShadowPlane, Side},
+    shade::{PlaneRows, plane_rows},
+    visibility::{LightPairs, Pairs},
+};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Receivers nearer to a plane than this along the ray are not shadowed by it, unit space. Receivers that lie *on*
+/// a plane are computed up to 1e-7 / n.l beside it (5e-5 at the edge-on limit); at 1e-2 contact shadows detach
+/// visibly from their caster.
+pub const BIAS: f32 = 5e-4;
+
+/// Pairs per block of the vector loop; the block's texels stay in registers and L1.
+const BLOCK: usize = 64;
+
+/// Lights per unit of parallel work. Fixed, so that sums are added in the same order at any thread count.
+const LIGHTS_PER_TASK: usize = 16;
+
+/// A plane with a binary texture. `blocked` has one entry more than texels: the last stands for "crosses outside"
+/// and is always 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mask {
+    /// Where it lies.
+    pub plane: ShadowPlane,
+    /// Which receivers it serves.
+    pub side: Side,
+    /// Texels along u.
+    pub width: usize,
+    /// Texels along v.
+    pub height: usize,
+    /// `[row][column]`, 1 = blocks, 0 = open.
+    pub blocked: Vec<u8>,
+}
+
+impl Mask {
+    /// An open texture.
+    #[must_use]
+    pub fn open(plane: ShadowPlane, side: Side, width: usize, height: usize) -> Self {
+        Self { plane, side, width, height, blocked: vec![0; width * height + 1] }
+    }
+
+    /// Calls `f(pair, texel)` for the pairs of one light, in order; the texel past the last means "outside".
+    /// Does nothing where the plane casts nothing under this light.
+    pub fn for_each_texel(&self, pairs: &LightPairs, f: impl FnMut(usize, usize)) {
+        if let Some(rows) = plane_rows(&self.plane, self.side, pairs.light) {
+            for_each_texel(&rows, pairs, 0..pairs.len(), (self.width, self.height), f);
+        }
+    }
+}
+
+/// See [`Mask::for_each_texel`]; `size` is `(width, height)`.
+fn for_each_texel(
+    rows: &PlaneRows,
+    pairs: &LightPairs,
+    range: Range<usize>,
+    size: (usize, usize),
+    mut f: impl FnMut(usize, usize),
+) {
+    let outside = (size.0 * size.1) as u32;
+    let (w, h, stride) = (size.0 as f32, size.1 as f32, size.0 as u32);
+    let (ra, rb, rs) = (rows.a.to_array(), rows.b.to_array(), rows.s.to_array());
+    let mut texels = [0u32; BLOCK];
+    let mut start = range.start;
+    while start < range.end {
+        let end = (start + BLOCK).min(range.end);
+        let (x, y, z) = (&pairs.x[start..end], &pairs.y[start..end], &pairs.z[start..end]);
+        for (((texel, &x), &y), &z) in texels.iter_mut().zip(x).zip(y).zip(z) {
+            let a = (ra[0] * x + ra[1] * y + ra[2] * z + ra[3]) * w;
+            let b = (rb[0] * x + rb[1] * y + rb[2] * z + rb[3]) * h;
+            let s = rs[0] * x + rs[1] * y + rs[2] * z + rs[3];
+            let inside = (s > BIAS) & (a >= 0.0) & (a < w) & (b >= 0.0) & (b < h);
+            let index =
+                (b.max(0.0).min(h) as i32 as u32).wrapping_mul(stride).wrapping_add(a.max(0.0).min(w) as i32 as u32);
+            *texel = if inside { index } else { outside };
+        }
+        for (i, &texel) in texels[..end - start].iter().enumerate() {
+            f(start + i, texel as usize);
+        }
+        start = end;
+    }
+}
+
+/// What a plane would bring.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Score {
+    /// Drop of the weighted error, cross-validated: texels decided on one fold of the receivers, counted on the
+    /// other. A gain counted on the votes that chose the texels favours planes that spread few pairs over many.
+    pub gain: f64,
+    /// The side for which that is largest.
+    pub side: Side,
+}
+
+/// Scores a plane on pairs that nothing covers yet, with a texture of `texels` x `texels`.
+#[must_use]
+pub fn score(pairs: &Pairs, plane: &ShadowPlane, texels: usize) -> Score {
+    let count = texels * texels + 1;
+    // [side of the receivers: front, back][fold][texel]
+    let mut grids = vec![0.0f32; 4 * count];
+    for light in &pairs.lights {
+        let Some(rows) = plane_rows(plane, Side::Both, light.light) else { continue };
+        // Receivers that a crossing can shadow lie on the side away from the light.
+        let back = usize::from(plane.normal().dot(light.light) > 0.0);
+        for (fold, range) in [0..light.split, light.split..light.len()].into_iter().enumerate() {
+            let grid = &mut grids[(2 * back + fold) * count..][..count];
+            for_each_texel(&rows, light, range, (texels, texels), |i, texel| grid[texel] += light.vote[i]);
+        }
+    }
+    let grid = |back: usize, fold: usize| &grids[(2 * back + fold) * count..][..count - 1];
+    let folds = |back: usize| (grid(back, 0), grid(back, 1));
+    let ((f0, f1), (b0, b1)) = (folds(0), folds(1));
+    let sum = |p: &[f32], q: &[f32]| p.iter().zip(q).map(|(p, q)| p + q).collect::<Vec<f32>>();
+    let both = cross_validated(&sum(f0, b0), &sum(f1, b1), texels);
+    let (front, back) = (cross_validated(f0, f1, texels), cross_validated(b0, b1, texels));
+    let mut best = Score { gain: both, side: Side::Both };
+    for (gain, side) in [(front, Side::Front), (back, Side::Back)] {
+        if gain > best.gain {
+            best = Score { gain, side };
+        }
+    }
+    best
+}
+
+/// Gain of the texels that one fold's votes, smoothed, would block, counted on the other fold; both ways.
+fn cross_validated(votes0: &[f32], votes1: &[f32], width: usize) -> f64 {
+    let one_way = |deciding: &[f32], counting: &[f32]| {
+        let chosen = smoothed(deciding, width).into_iter().zip(counting).filter(|(decision, _)| *decision > 0.0);
+        chosen.map(|(_, vote)| f64::from(*vote)).sum::<f64>()
+    };
+    one_way(votes0, votes1) + one_way(votes1, votes0)
+}
+
+/// Votes under a 3 x 3 binomial kernel; beyond the border there are none.
+pub(crate) fn smoothed(votes: &[f32], width: usize) -> Vec<f32> {
+    let height = votes.len() / width;
+    let mut rows = vec![0.0; votes.len()];
+    for (row, votes) in rows.chunks_exact_mut(width).zip(votes.chunks_exact(width)) {
+        for x in 0..width {
+            let (left, right) =
+                (if x > 0 { votes[x - 1] } else { 0.0 }, if x + 1 < width { votes[x + 1] } else { 0.0 });
+            row[x] = left + 2.0 * votes[x] + right;
+        }
+    }
+    let mut out = vec![0.0; votes.len()];
+    for y in 0..height {
+        for x in 0..width {
+            let i = y * width + x;
+            let above = if y > 0 { rows[i - width] } else { 0.0 };
+            let below = if y + 1 < height { rows[i + width] } else { 0.0 };
+            out[i] = above + 2.0 * rows[i] + below;
+        }
+    }
+    out
+}
+
+/// Sums of the votes per texel (plus the one for "outside") over the pairs for which `counts(light, pair, texel)`.
+pub fn sum_votes(pairs: &Pairs, mask: &Mask, counts: impl Fn(usize, usize, usize) -> bool + Sync) -> Vec<f32> {
+    let partial = |(task, lights): (usize, &[LightPairs])| {
+        let mut votes = vec![0.0f32; mask.blocked.len()];
+        for (k, light) in lights.iter().enumerate() {
+            let index = task * LIGHTS_PER_TASK + k;
+            mask.for_each_texel(light, |i, texel| {
+                if counts(index, i, texel) {
+                    votes[texel] += light.vote[i];
+                }
+            });
+        }
+        votes
+    };
+    let partials: Vec<Vec<f32>> = pairs.lights.par_chunks(LIGHTS_PER_TASK).enumerate().map(partial).collect();
+    let mut votes = vec![0.0f32; mask.blocked.len()];
+    for partial in partials {
+        votes.iter_mut().zip(partial).for_each(|(sum, v)| *sum += v);
+    }
+    votes
+}
+
+/// The best binary texture of a plane for pairs that nothing covers yet.
+#[must_use]
+pub fn best_mask(pairs: &Pairs, plane: &ShadowPlane, side: Side, texels: usize) -> Mask {
+    let mut mask = Mask::open(*plane, side, texels, texels);
+    let votes = sum_votes(pairs, &mask, |_, _, _| true);
+    for (blocked, vote) in mask.blocked.iter_mut().zip(smoothed(&votes[..texels * texels], texels)) {
+        *blocked = u8::from(vote > 0.0);
+    }
+    mask
+}
+
+/// The pairs that none of `masks` covers.
+#[must_use]
+pub fn uncovered(pairs: &Pairs, masks: &[&Mask]) -> Pairs {
+    let filter = |light: &LightPairs| {
+        let mut covered = vec![0u8; light.len()];
+        for mask in masks {
+            mask.for_each_texel(light, |i, texel| covered[i] |= mask.blocked[texel]);
+        }
+        light.filtered(|i| covered[i] == 0)
+    };
+    Pairs { lights: pairs.lights.par_iter().map(filter).collect(), ..*pairs }
+}
+
+/// A sample of about `blocked` blocked and `lit` lit pairs, evenly taken from each light, with votes scaled up to
+/// what they stand for. Lit pairs are many (19 in 20 on a teapot) and alike, so they can be thinned much further
+/// than the blocked ones, of which a search runs out first.
+#[must_use]
+pub fn thinned(pairs: &Pairs, blocked: usize, lit: usize) -> Pairs {
+    let total = pairs.len();
+    let total_blocked: usize = pairs.lights.par_iter().map(|l| l.vote.iter().filter(|v| **v > 0.0).count()).sum();
+    let stride = |have: usize, want: usize| (have / want.max(1)).max(1);
+    let strides = [stride(total_blocked, blocked), stride(total - total_blocked, lit)];
+    let thin = |(k, light): (usize, &LightPairs)| {
+        // Start at another phase for each light, so that not always the same receivers are taken.
+        let mut seen = [k, k];
+        let mut sample = light.filtered(|i| {
+            let kind = usize::from(light.vote[i] <= 0.0);
+            seen[kind] += 1;
+            seen[kind] % strides[kind] == 0
+        });
+        for vote in &mut sample.vote {
+            *vote *= strides[usize::from(*vote <= 0.0)] as f32;
+        }
+        sample
+    };
+    Pairs { lights: pairs.lights.par_iter().enumerate().map(thin).collect(), ..*pairs }
+}
