@@ -95,8 +95,8 @@ const CUT_PX: f32 = 1.2;
 // Shaded, with a line in a plane's colour where that plane cuts the surface.
 @fragment
 fn fs_planes(surface: Surface, @builtin(front_facing) front: bool) -> @location(0) vec4f {
-    let p_per_px = vec2f(length(dpdx(surface.p)), length(dpdy(surface.p)));
-    let px = max(p_per_px.x, p_per_px.y);
+    let p_per_x = dpdx(surface.p);
+    let p_per_y = dpdy(surface.p);
     if is_hole(surface) {
         discard;
     }
@@ -105,8 +105,10 @@ fn fs_planes(surface: Surface, @builtin(front_facing) front: bool) -> @location(
     let p1 = vec4f(surface.p, 1.0);
     for (var i = 0u; i < frame.rectangle_count; i++) {
         let ab = vec2f(dot(rectangles[i].a, p1), dot(rectangles[i].b, p1));
-        let distance_px = abs(dot(rectangles[i].plane, p1)) / px;
-        if distance_px < CUT_PX && all(ab >= vec2f(0.0)) && all(ab <= vec2f(1.0)) {
+        // How fast the distance to the plane grows on the screen: lines of one width at any angle.
+        let n = rectangles[i].plane.xyz;
+        let per_px = length(vec2f(dot(n, p_per_x), dot(n, p_per_y)));
+        if abs(dot(rectangles[i].plane, p1)) < CUT_PX * per_px && all(ab >= vec2f(0.0)) && all(ab <= vec2f(1.0)) {
             color = rectangles[i].color.rgb;
         }
     }

@@ -5,7 +5,7 @@
 override OPACITY: f32;
 
 // Opacity of open and of blocking texels: the model must stay visible through the first.
-const OPEN: f32 = 0.16;
+const OPEN: f32 = 0.22;
 const BLOCKING: f32 = 0.85;
 // Width of the outline, pixels.
 const OUTLINE_PX: f32 = 2.0;

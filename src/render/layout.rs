@@ -1,4 +1,5 @@
-//! The structs that Rust and WGSL share, byte for byte, and the table by which a test compares them.
+//! The structs that Rust and WGSL share, byte for byte, and the table by which a test compares them. What their members
+//! mean stands in the shaders.
 
 use super::atlas::Slot;
 use bytemuck::{Pod, Zeroable};
