@@ -7,13 +7,14 @@ struct Material {
     base_color: vec4f,
     // Alpha below this is a hole; negative: no cut-out.
     alpha_cutoff: f32,
+    // 1: texture coordinates repeat along u, along v; 0: they clamp.
+    repeat_u: u32,
+    repeat_v: u32,
 }
 
 @group(1) @binding(0) var<storage, read> materials: array<Material>;
 @group(1) @binding(1) var base_image: texture_2d<f32>;
 @group(1) @binding(2) var base_sampler: sampler;
-// Nearest texel: holes are where the traced reference has them.
-@group(1) @binding(3) var cutout_sampler: sampler;
 
 struct Vertex {
     @location(0) p: vec3f,
@@ -39,10 +40,15 @@ fn vs_surface(vertex: Vertex) -> Surface {
     return Surface(clip, vertex.p, vertex.geometric_normal, vertex.shading_normal, vertex.uv, vertex.material);
 }
 
+// The opposite of Cutout::is_solid in solver/src/mesh.rs: nearest texel, so that holes are where the traced reference
+// has them. By a load, since the GL backend allows an image one sampler.
 fn is_hole(surface: Surface) -> bool {
     let material = materials[surface.material];
-    let alpha = textureSampleLevel(base_image, cutout_sampler, surface.uv, 0.0).a * material.base_color.a;
-    return alpha < material.alpha_cutoff;
+    let repeat = vec2<bool>(material.repeat_u == 1u, material.repeat_v == 1u);
+    let uv = select(clamp(surface.uv, vec2f(0.0), vec2f(1.0)), fract(surface.uv), repeat);
+    let size = textureDimensions(base_image);
+    let texel = min(vec2u(uv * vec2f(size)), size - 1u);
+    return textureLoad(base_image, texel, 0).a * material.base_color.a < material.alpha_cutoff;
 }
 
 // Does the side of the surface that is drawn face the light?

@@ -25,7 +25,7 @@ pub struct Slot {
 pub struct Atlas {
     /// Width and height of a layer.
     pub side: u32,
-    /// Layers, at least 1.
+    /// Layers; wgpu's GL backend takes 1 for no array and multiples of 6 for cube maps, so neither occurs.
     pub layers: u32,
     /// RGBA, `[layer][row][column]`.
     pub rgba: Vec<u8>,
@@ -48,7 +48,8 @@ impl Atlas {
             });
         }
         let slots = shelve(textures, side);
-        let layers = slots.iter().map(|slot| slot.layer + 1).max().unwrap_or(1);
+        let used = slots.iter().map(|slot| slot.layer + 1).max().unwrap_or(1);
+        let layers = if used == 1 || used % 6 == 0 { used + 1 } else { used };
         if layers > max_layers {
             return Err(RenderError::TooLarge {
                 what: "occluder atlas layers",
@@ -130,9 +131,9 @@ mod tests {
     }
 
     #[test]
-    fn no_textures_make_one_texel() {
+    fn no_textures_make_one_texel_a_layer() {
         let atlas = Atlas::pack(&[], 4096, 256).unwrap();
-        assert_eq!((atlas.side, atlas.layers, atlas.rgba.len()), (1, 1, 4));
+        assert_eq!((atlas.side, atlas.layers, atlas.rgba.len()), (1, 2, 8));
     }
 
     #[test]

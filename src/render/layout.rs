@@ -125,7 +125,9 @@ impl Rectangle {
 pub struct Material {
     pub base_color: Vec4,
     pub alpha_cutoff: f32,
-    pub padding: [u32; 3],
+    pub repeat_u: u32,
+    pub repeat_v: u32,
+    pub padding: u32,
 }
 
 /// `Vertex` of forward.wgsl: a vertex buffer, so the shader's struct has locations instead of offsets.
@@ -172,6 +174,6 @@ pub fn struct_layouts() -> Vec<StructLayout> {
         layout!(OccluderSlot { region, layer, channel }),
         layout!(CastingPlane { a, b, s, slot, bias, side }),
         layout!(Rectangle { origin, u, v, plane, a, b, color, slot }),
-        layout!(Material { base_color, alpha_cutoff }),
+        layout!(Material { base_color, alpha_cutoff, repeat_u, repeat_v }),
     ]
 }

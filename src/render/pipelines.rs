@@ -93,8 +93,7 @@ impl Layouts {
             ],
         );
         let base_image = texture(TextureViewDimension::D2);
-        let material =
-            group("material", &[(fragment, storage), (fragment, base_image), (fragment, sampler), (fragment, sampler)]);
+        let material = group("material", &[(fragment, storage), (fragment, base_image), (fragment, sampler)]);
         let pipeline_layout = |groups: &[Option<&wgpu::BindGroupLayout>]| {
             gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 bind_group_layouts: groups,

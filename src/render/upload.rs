@@ -113,7 +113,9 @@ fn upload_materials(gpu: &Gpu, scene: &Scene) -> wgpu::Buffer {
     let material = |material: &crate::scene::Material| Material {
         base_color: Vec4::from_array(material.base_color),
         alpha_cutoff: material.alpha_cutoff.unwrap_or(-1.0),
-        padding: [0; 3],
+        repeat_u: u32::from(material.repeat[0]),
+        repeat_v: u32::from(material.repeat[1]),
+        padding: 0,
     };
     let materials: Vec<Material> = scene.materials.iter().map(material).collect();
     gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -153,16 +155,14 @@ fn bind(
     view: &wgpu::TextureView,
     repeat: [bool; 2],
 ) -> wgpu::BindGroup {
-    let sampler = |filter| {
-        let [u, v] = repeat.map(|r| if r { wgpu::AddressMode::Repeat } else { wgpu::AddressMode::ClampToEdge });
-        gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-            address_mode_u: u,
-            address_mode_v: v,
-            mag_filter: filter,
-            min_filter: filter,
-            ..Default::default()
-        })
-    };
+    let [u, v] = repeat.map(|r| if r { wgpu::AddressMode::Repeat } else { wgpu::AddressMode::ClampToEdge });
+    let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+        address_mode_u: u,
+        address_mode_v: v,
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        ..Default::default()
+    });
     let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("material"),
@@ -170,8 +170,7 @@ fn bind(
         entries: &[
             entry(0, materials.as_entire_binding()),
             entry(1, wgpu::BindingResource::TextureView(view)),
-            entry(2, wgpu::BindingResource::Sampler(&sampler(wgpu::FilterMode::Linear))),
-            entry(3, wgpu::BindingResource::Sampler(&sampler(wgpu::FilterMode::Nearest))),
+            entry(2, wgpu::BindingResource::Sampler(&sampler)),
         ],
     })
 }
