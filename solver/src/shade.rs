@@ -25,8 +25,10 @@ pub struct PlaneRows {
     pub s: Vec4,
 }
 
-/// The duals of a rectangle's edges: `a = (q-o).dual_a`, `b = (q-o).dual_b`.
-fn duals(plane: &ShadowPlane) -> (Vec3, Vec3) {
+/// The duals of a rectangle's edges: `a = (q-o).dual_a`, `b = (q-o).dual_b`. Not finite where the rectangle has no
+/// area.
+#[must_use]
+pub fn duals(plane: &ShadowPlane) -> (Vec3, Vec3) {
     let n = plane.u.cross(plane.v);
     let inv = 1.0 / n.length_squared();
     (plane.v.cross(n) * inv, n.cross(plane.u) * inv)

@@ -1,0 +1,92 @@
+// Snippet: the plane lookup, twin of solver/src/shade.rs, name for name (Coleman 2006, eq. 2-8, rearranged).
+
+// |n.l| below which a plane casts nothing; shade::EDGE_ON.
+override EDGE_ON: f32;
+
+// Where an occluder texture lies in the atlas.
+struct OccluderSlot {
+    // x, y, width, height in texels.
+    region: vec4f,
+    layer: u32,
+    channel: u32,
+}
+
+// A plane that casts under this light. Directional light: the three rows of shade::PlaneRows, affine in the
+// receiver. Point light: a and b are the edges' duals, affine in the crossing point, and s is the plane's equation
+// (n, -n.o).
+struct CastingPlane {
+    a: vec4f,
+    b: vec4f,
+    s: vec4f,
+    slot: OccluderSlot,
+    bias: f32,
+    // 0: receivers on both sides, 1: in front, 2: behind. Only point lights ask.
+    side: u32,
+}
+
+// Texture coordinates of a crossing; `casts` is false where the ray misses the rectangle.
+struct Crossing {
+    ab: vec2f,
+    casts: bool,
+}
+
+@group(0) @binding(1) var<storage, read> casting: array<CastingPlane>;
+@group(0) @binding(2) var occluders: texture_2d_array<f32>;
+@group(0) @binding(3) var occluder_sampler: sampler;
+
+// Where the ray from p towards a directional light crosses the plane beyond its bias.
+fn crossing(plane: CastingPlane, p: vec3f) -> Crossing {
+    let p1 = vec4f(p, 1.0);
+    let ab = vec2f(dot(plane.a, p1), dot(plane.b, p1));
+    let s = dot(plane.s, p1);
+    return Crossing(ab, s > plane.bias && all(ab >= vec2f(0.0)) && all(ab <= vec2f(1.0)));
+}
+
+// The same for a point light at c: between p and c, beyond the bias, not edge-on; signs first, then the division.
+fn crossing_point_light(plane: CastingPlane, c: vec3f, p: vec3f) -> Crossing {
+    let to_light = c - p;
+    let n_dot_d = dot(plane.s.xyz, to_light);
+    let height = -dot(plane.s, vec4f(p, 1.0));
+    let distance = length(to_light);
+    let served = plane.side == 0u || (plane.side == 1u && n_dot_d < 0.0) || (plane.side == 2u && n_dot_d > 0.0);
+    let ahead = height * n_dot_d > 0.0 && abs(height) < abs(n_dot_d);
+    if !(served && ahead && abs(n_dot_d) >= EDGE_ON * distance) {
+        return Crossing(vec2f(0.0), false);
+    }
+    let s = height / n_dot_d;
+    let q1 = vec4f(p + s * to_light, 1.0);
+    let ab = vec2f(dot(plane.a, q1), dot(plane.b, q1));
+    return Crossing(ab, s * distance > plane.bias && all(ab >= vec2f(0.0)) && all(ab <= vec2f(1.0)));
+}
+
+// Bilinear coverage 0..1 at ab in 0..1, taps clamped to the region.
+fn sample(slot: OccluderSlot, ab: vec2f) -> f32 {
+    let size = slot.region.zw;
+    let texel = slot.region.xy + clamp(ab * size, vec2f(0.5), size - 0.5);
+    let uv = texel / vec2f(textureDimensions(occluders));
+    return textureSampleLevel(occluders, occluder_sampler, uv, slot.layer, 0.0)[slot.channel];
+}
+
+// Predicted visibility of a receiver at p under a directional light: left as soon as one plane blocks.
+fn visibility(p: vec3f) -> f32 {
+    var v = 1.0;
+    for (var i = 0u; i < frame.casting_count && v > 0.0; i++) {
+        let hit = crossing(casting[i], p);
+        if hit.casts {
+            v *= 1.0 - sample(casting[i].slot, hit.ab);
+        }
+    }
+    return v;
+}
+
+// Predicted visibility of a receiver at p under a point light at c.
+fn visibility_point_light(c: vec3f, p: vec3f) -> f32 {
+    var v = 1.0;
+    for (var i = 0u; i < frame.casting_count && v > 0.0; i++) {
+        let hit = crossing_point_light(casting[i], c, p);
+        if hit.casts {
+            v *= 1.0 - sample(casting[i].slot, hit.ab);
+        }
+    }
+    return v;
+}

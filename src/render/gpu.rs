@@ -1,0 +1,201 @@
+//! The graphics device, the table of shaders, and reading pictures back.
+//!
+//! Headless: no window, no surface. The best adapter wins: discrete, integrated, virtual, then software (lavapipe).
+
+use super::RenderError;
+pub use super::layout::{StructLayout, struct_layouts};
+use std::{
+    fmt::Write,
+    sync::{Arc, Mutex, PoisonError},
+};
+
+/// One pass: a file of `shaders/`, joined with the snippets it needs.
+#[derive(Clone, Copy, Debug)]
+pub struct Shader {
+    /// The pass, as its file is called.
+    pub name: &'static str,
+    /// File names and texts: snippets first, the pass last.
+    pub parts: &'static [(&'static str, &'static str)],
+}
+
+impl Shader {
+    /// The WGSL module.
+    #[must_use]
+    pub fn source(&self) -> String {
+        self.parts.iter().map(|(_, text)| *text).collect::<Vec<_>>().join("\n")
+    }
+}
+
+macro_rules! parts {
+    ($($file:literal),*) => {
+        &[$(($file, include_str!(concat!("../../shaders/", $file)))),*]
+    };
+}
+
+/// The model, lit, with its shadows.
+pub const FORWARD: Shader =
+    Shader { name: "forward", parts: parts!["frame.wgsl", "planes.wgsl", "rectangles.wgsl", "forward.wgsl"] };
+/// The planes drawn through the model.
+pub const PLANE_RECTANGLES: Shader = Shader {
+    name: "plane_rectangles",
+    parts: parts!["frame.wgsl", "planes.wgsl", "rectangles.wgsl", "plane_rectangles.wgsl"],
+};
+/// All passes.
+pub const SHADERS: &[Shader] = &[FORWARD, PLANE_RECTANGLES];
+
+/// A graphics device. Cheap to clone; all clones are the same device.
+#[derive(Clone, Debug)]
+pub struct Gpu {
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
+    adapter_name: String,
+    failure: Arc<Mutex<Option<String>>>,
+}
+
+impl Gpu {
+    /// Opens the best adapter that gives a device.
+    ///
+    /// # Errors
+    /// [`RenderError::NoAdapter`] where there is none, [`RenderError::Device`] where none is usable. In both cases
+    /// [`super::cpu`] draws the same frames.
+    pub fn new() -> Result<Self, RenderError> {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+        let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+        if adapters.is_empty() {
+            return Err(RenderError::NoAdapter);
+        }
+        adapters.sort_by_key(rank);
+        let mut reason = String::new();
+        for adapter in &adapters {
+            match Self::open(adapter) {
+                Ok(gpu) => return Ok(gpu),
+                // Writing to a string cannot fail.
+                Err(error) => _ = write!(reason, "{}: {error}; ", adapter.get_info().name),
+            }
+        }
+        Err(RenderError::Device { reason })
+    }
+
+    fn open(adapter: &wgpu::Adapter) -> Result<Self, wgpu::RequestDeviceError> {
+        let available = adapter.limits();
+        // Modest needs, but models and atlases as large as the adapter can take.
+        let required_limits = wgpu::Limits {
+            max_buffer_size: available.max_buffer_size,
+            max_storage_buffer_binding_size: available.max_storage_buffer_binding_size,
+            max_texture_array_layers: available.max_texture_array_layers,
+            ..wgpu::Limits::downlevel_defaults().using_resolution(available)
+        };
+        let descriptor = wgpu::DeviceDescriptor { label: Some("shadowfit"), required_limits, ..Default::default() };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))?;
+        // wgpu's default handler panics; keep the first error for the caller instead.
+        let failure = Arc::new(Mutex::new(None));
+        let first = Arc::clone(&failure);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            first.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error.to_string());
+        }));
+        let info = adapter.get_info();
+        Ok(Self { device, queue, adapter_name: format!("{} ({})", info.name, info.backend), failure })
+    }
+
+    /// Name of the adapter and its interface, for reports: `llvmpipe (LLVM 15.0.6, 256 bits) (vulkan)`.
+    #[must_use]
+    pub fn adapter_name(&self) -> &str {
+        &self.adapter_name
+    }
+
+    pub(crate) fn limits(&self) -> wgpu::Limits {
+        self.device.limits()
+    }
+
+    /// Compiles a pass.
+    pub(crate) fn module(&self, shader: &Shader) -> wgpu::ShaderModule {
+        self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(shader.name),
+            source: wgpu::ShaderSource::Wgsl(shader.source().into()),
+        })
+    }
+
+    /// The first error that the driver reported since the last call.
+    pub(crate) fn check(&self) -> Result<(), RenderError> {
+        match self.failure.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            Some(reason) => Err(RenderError::Driver { reason }),
+            None => Ok(()),
+        }
+    }
+
+    /// Submits `commands` and waits until `readback` holds the picture that they copy there.
+    pub(crate) fn submit_and_read(
+        &self,
+        commands: wgpu::CommandBuffer,
+        readback: &Readback,
+    ) -> Result<image::RgbaImage, RenderError> {
+        self.queue.submit([commands]);
+        self.check()?;
+        let driver = |reason: String| RenderError::Driver { reason };
+        readback.buffer.map_async(wgpu::MapMode::Read, .., |_| ());
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| driver(error.to_string()))?;
+        let picture = {
+            let bytes = readback.buffer.get_mapped_range(..).map_err(|error| driver(error.to_string()))?;
+            readback.picture(&bytes)
+        };
+        readback.buffer.unmap();
+        self.check()?;
+        picture.ok_or_else(|| driver("the picture read back is too short".into()))
+    }
+}
+
+fn rank(adapter: &wgpu::Adapter) -> (u8, bool) {
+    let info = adapter.get_info();
+    let kind = match info.device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    };
+    (kind, info.backend == wgpu::Backend::Gl)
+}
+
+/// A buffer that a picture is copied into, row by row.
+#[derive(Clone, Debug)]
+pub(crate) struct Readback {
+    size_px: [u32; 2],
+    buffer: wgpu::Buffer,
+}
+
+impl Readback {
+    pub(crate) fn new(gpu: &Gpu, size_px: [u32; 2]) -> Self {
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("readback"),
+            size: u64::from(row_bytes(size_px[0])) * u64::from(size_px[1]),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        Self { size_px, buffer }
+    }
+
+    /// Records the copy of an RGBA8 texture.
+    pub(crate) fn copy_from(&self, texture: &wgpu::Texture, encoder: &mut wgpu::CommandEncoder) {
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(row_bytes(self.size_px[0])),
+            rows_per_image: None,
+        };
+        let destination = wgpu::TexelCopyBufferInfo { buffer: &self.buffer, layout };
+        encoder.copy_texture_to_buffer(texture.as_image_copy(), destination, texture.size());
+    }
+
+    fn picture(&self, bytes: &[u8]) -> Option<image::RgbaImage> {
+        let [width, height] = self.size_px;
+        let mut pixels = Vec::with_capacity(4 * width as usize * height as usize);
+        for row in bytes.chunks_exact(row_bytes(width) as usize) {
+            pixels.extend_from_slice(&row[..4 * width as usize]);
+        }
+        image::RgbaImage::from_raw(width, height, pixels)
+    }
+}
+
+/// Bytes of a row of RGBA8 pixels in a buffer.
+fn row_bytes(width_px: u32) -> u32 {
+    (4 * width_px).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
+}

@@ -1,0 +1,176 @@
+//! A scene -> vertex buffer, materials and base colour textures on the device, sorted into few draws.
+
+use super::{
+    RenderError,
+    gpu::Gpu,
+    layout::{Material, Vertex},
+    pipelines::Layouts,
+};
+use crate::scene::Scene;
+use glam::{Vec3, Vec4};
+use shadowfit_solver::mesh::{Frame, Sides};
+use std::{collections::BTreeMap, ops::Range};
+use wgpu::util::{DeviceExt, TextureDataOrder};
+
+/// What a draw has in common: cull mode and textures. The order of the draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Look {
+    double_sided: bool,
+    image: Option<usize>,
+    repeat: [bool; 2],
+}
+
+/// One draw.
+#[derive(Clone, Debug)]
+pub struct Batch {
+    /// Both sides are drawn.
+    pub double_sided: bool,
+    /// Group 1 of the forward pass.
+    pub bind_group: wgpu::BindGroup,
+    /// In [`Model::vertices`].
+    pub vertices: Range<u32>,
+}
+
+/// A scene on the device.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// All triangles, unindexed, sorted by batch.
+    pub vertices: wgpu::Buffer,
+    /// Draws.
+    pub batches: Vec<Batch>,
+}
+
+impl Model {
+    /// Uploads `scene` in the unit space of `frame`. Triangles keep their order within a batch, so that of two
+    /// equal ones the first wins the depth test, as it does in the BVH.
+    pub fn upload(gpu: &Gpu, layouts: &Layouts, scene: &Scene, frame: &Frame) -> Result<Self, RenderError> {
+        let (vertices, looks) = vertices(scene, frame);
+        let bytes: &[u8] = bytemuck::cast_slice(&vertices);
+        let limit = gpu.limits().max_buffer_size;
+        if bytes.len() as u64 > limit {
+            return Err(RenderError::TooLarge { what: "the triangles' bytes", needed: bytes.len() as u64, limit });
+        }
+        let vertices = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("triangles"),
+            contents: bytes,
+            usage: wgpu::BufferUsages::VERTEX,
+        });
+        let materials = upload_materials(gpu, scene);
+        let mut images = BTreeMap::new();
+        let mut batches = Vec::new();
+        for (look, range) in looks {
+            let view = match images.entry(look.image) {
+                std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
+                std::collections::btree_map::Entry::Vacant(entry) => {
+                    entry.insert(upload_image(gpu, look.image.map(|i| &*scene.images[i]))?)
+                }
+            };
+            let bind_group = bind(gpu, layouts, &materials, view, look.repeat);
+            batches.push(Batch { double_sided: look.double_sided, bind_group, vertices: range });
+        }
+        Ok(Self { vertices, batches })
+    }
+}
+
+fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Range<u32>)>) {
+    let mut triangles_of: BTreeMap<Look, Vec<usize>> = BTreeMap::new();
+    for (triangle, &material) in scene.material_of.iter().enumerate() {
+        let material = &scene.materials[material as usize];
+        let double_sided = scene.soup.sides[triangle] == Sides::Both;
+        // Without an image the repeat mode has no effect: one batch.
+        let repeat = if material.image.is_some() { material.repeat } else { [false; 2] };
+        triangles_of.entry(Look { double_sided, image: material.image, repeat }).or_default().push(triangle);
+    }
+    let mut vertices = Vec::with_capacity(3 * scene.material_of.len());
+    let mut looks = Vec::with_capacity(triangles_of.len());
+    for (look, triangles) in triangles_of {
+        let first = vertices.len() as u32;
+        vertices.extend(triangles.into_iter().flat_map(|triangle| triangle_vertices(scene, frame, triangle)));
+        looks.push((look, first..vertices.len() as u32));
+    }
+    (vertices, looks)
+}
+
+fn triangle_vertices(scene: &Scene, frame: &Frame, triangle: usize) -> [Vertex; 3] {
+    let corners = scene.soup.corners_model[triangle].map(|p| frame.unit_from_model(p));
+    // As Mesh computes it: slivers keep a normal.
+    let [u, v] = [corners[1], corners[2]].map(|p| (p - corners[0]).as_dvec3());
+    let geometric_normal = u.cross(v).normalize_or_zero().as_vec3();
+    std::array::from_fn(|corner| Vertex {
+        p: corners[corner],
+        geometric_normal,
+        shading_normal: finite_or(scene.normals[triangle][corner], geometric_normal),
+        uv: scene.uvs[triangle][corner],
+        material: scene.material_of[triangle],
+    })
+}
+
+fn finite_or(normal: Vec3, fallback: Vec3) -> Vec3 {
+    if normal.is_finite() && normal != Vec3::ZERO { normal } else { fallback }
+}
+
+fn upload_materials(gpu: &Gpu, scene: &Scene) -> wgpu::Buffer {
+    let material = |material: &crate::scene::Material| Material {
+        base_color: Vec4::from_array(material.base_color),
+        alpha_cutoff: material.alpha_cutoff.unwrap_or(-1.0),
+        repeat_u: u32::from(material.repeat[0]),
+        repeat_v: u32::from(material.repeat[1]),
+        padding: 0,
+    };
+    let materials: Vec<Material> = scene.materials.iter().map(material).collect();
+    gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("materials"),
+        contents: bytemuck::cast_slice(&materials),
+        usage: wgpu::BufferUsages::STORAGE,
+    })
+}
+
+/// Uploads an sRGB image, or one white texel for materials without.
+fn upload_image(gpu: &Gpu, image: Option<&image::RgbaImage>) -> Result<wgpu::TextureView, RenderError> {
+    let (width, height) = image.map_or((1, 1), image::RgbaImage::dimensions);
+    let limit = gpu.limits().max_texture_dimension_2d;
+    if width.max(height) > limit {
+        let needed = u64::from(width.max(height));
+        return Err(RenderError::TooLarge { what: "the sides of base colour images", needed, limit: limit.into() });
+    }
+    let descriptor = wgpu::TextureDescriptor {
+        label: Some("base colour"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba8UnormSrgb,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    };
+    let texels = image.map_or(&[255; 4][..], |image| image.as_raw());
+    let texture = gpu.device.create_texture_with_data(&gpu.queue, &descriptor, TextureDataOrder::LayerMajor, texels);
+    Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
+}
+
+fn bind(
+    gpu: &Gpu,
+    layouts: &Layouts,
+    materials: &wgpu::Buffer,
+    view: &wgpu::TextureView,
+    repeat: [bool; 2],
+) -> wgpu::BindGroup {
+    let [u, v] = repeat.map(|r| if r { wgpu::AddressMode::Repeat } else { wgpu::AddressMode::ClampToEdge });
+    let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+        address_mode_u: u,
+        address_mode_v: v,
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        ..Default::default()
+    });
+    let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("material"),
+        layout: &layouts.material,
+        entries: &[
+            entry(0, materials.as_entire_binding()),
+            entry(1, wgpu::BindingResource::TextureView(view)),
+            entry(2, wgpu::BindingResource::Sampler(&sampler)),
+        ],
+    })
+}
