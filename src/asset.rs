@@ -1,11 +1,11 @@
 //! The shadow asset: the model's own file with shadow planes and occluder textures inside, and back.
 //!
-//! [`write`] takes an input model and baked planes and writes, into one folder, `STEM.shadow.glb` (the input
+//! [`write()`] takes an input model and baked planes and writes, into one folder, `STEM.shadow.glb` (the input
 //! with the glTF extension [`EXTENSION`]), `STEM.shadow.json` (the same set of planes with `uri`s in the place of
-//! texture indices) and `STEM.atlas-0.png`, ... [`read`] takes any of these, checks it, and gives the set back.
+//! texture indices) and `STEM.atlas-0.png`, ... [`read()`] takes any of these, checks it, and gives the set back.
 //! [`read_plane_file`] reads rectangles that a person placed.
 //!
-//! Numbers in the files are in model space, metres, f64 written so that they read back exactly; the solver's are
+//! Numbers in the files are in model space, metres, f64 in the shortest spelling that stands for them; the solver's are
 //! in unit space and f32. No planes is legal and means "no self-shadow": the set is there, without textures.
 //!
 //! Guaranteed: every other byte of the input's JSON and buffers is kept (only `buffers[0].byteLength` changes);

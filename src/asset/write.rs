@@ -138,7 +138,7 @@ pub fn write(request: &AssetRequest<'_>) -> Result<Written, AssetError> {
     })
 }
 
-/// Can [`write`] extend this model? Asked before a long search, so that it does not end in vain.
+/// Can [`write()`] extend this model? Asked before a long search, so that it does not end in vain.
 ///
 /// # Errors
 /// The file cannot be read, is no glTF 2.0, carries the extension already, or names files outside its folder.
@@ -302,7 +302,6 @@ fn fitted_already(root: &Value) -> Option<String> {
     if carries(root) {
         return Some(format!("/extensions/{EXTENSION}"));
     }
-    let list = |value: &Value, key: &str| value.get(key).and_then(Value::as_array).cloned().unwrap_or_default();
     let node = list(root, "nodes").iter().position(carries).map(|i| format!("/nodes/{i}/extensions/{EXTENSION}"));
     let labelled = |mesh: &Value| list(mesh, "primitives").iter().any(carries);
     let mesh = || list(root, "meshes").iter().position(labelled).map(|i| format!("/meshes/{i}/primitives"));
@@ -311,6 +310,11 @@ fn fitted_already(root: &Value) -> Option<String> {
         named.map(|i| format!("/extensionsRequired/{i}"))
     };
     node.or_else(mesh).or_else(required)
+}
+
+/// The elements of an array member, none where it is missing.
+fn list<'a>(value: &'a Value, key: &str) -> &'a [Value] {
+    value.get(key).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
 /// Appends the pictures, each at a multiple of four, and returns their offsets.

@@ -29,7 +29,7 @@ fn textures_of_any_size_never_overlap() {
         texels += sizes.iter().map(|[w, h]| u64::from(w * h)).sum::<u64>();
         bytes += layout.texture_bytes();
     }
-    // Measured: 86 % full, with many rounds of one to five textures. A broken third channel would give 57 %.
+    // Measured: 84 % full, rounds of one to five textures included. Without the third channel it would be 56 %.
     assert!(texels as f64 > 0.8 * bytes as f64, "{texels} texels in {bytes} bytes");
 }
 
