@@ -114,3 +114,10 @@ fn baked(mask: &Mask) -> BakedPlane {
     let texture = OccluderTexture { width: mask.width, height: mask.height, coverage };
     BakedPlane { plane: mask.plane, texture, side: mask.side, bias: BIAS }
 }
+
+impl Default for BakeOptions {
+    /// 256 texels, as the `balanced` preset bakes.
+    fn default() -> Self {
+        Self { texture_size: 256, rounds: 3, smoothing: 2, turn: Turn::Free }
+    }
+}

@@ -42,6 +42,15 @@ pub struct SelectionOptions {
     pub replace_rounds: usize,
 }
 
+/// What the caller says to a set of planes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Look for more.
+    Continue,
+    /// Good enough: stop, and see whether fewer do.
+    Enough,
+}
+
 /// The planes found.
 #[derive(Clone, Debug, Default)]
 pub struct Selection {
@@ -85,13 +94,14 @@ struct Search<'a> {
     high: Vec3,
 }
 
-/// Chooses planes for `pairs`; `progress` is told the number of planes after each pick.
+/// Chooses planes for `pairs`. `judge` sees the planes after each pick; once it says [`Verdict::Enough`] the search
+/// turns to fewer planes and keeps the smallest set that `judge` accepts.
 pub fn select(
     mesh: &Mesh,
     pairs: &Pairs,
     candidates: &[Candidate],
     options: &SelectionOptions,
-    progress: &mut dyn FnMut(usize),
+    judge: &mut dyn FnMut(&[Mask]) -> Verdict,
 ) -> Selection {
     let corners = || mesh.corners.iter().flatten();
     let low = corners().fold(Vec3::INFINITY, |a, p| a.min(*p));
@@ -102,7 +112,7 @@ pub fn select(
     if pairs.shadow_weight <= 0.0 {
         return Selection::default();
     }
-    let greedy = search.greedy(progress);
+    let (greedy, verdict) = search.greedy(judge);
     let mut planes = greedy.clone();
     let mut replaced = 0;
     for _ in 0..options.replace_rounds {
@@ -112,7 +122,10 @@ pub fn select(
             break;
         }
     }
-    let dropped = search.drop_unpaid(&mut planes);
+    let mut dropped = search.drop_unpaid(&mut planes);
+    if verdict == Verdict::Enough {
+        dropped += search.shrink(&mut planes, judge);
+    }
     Selection { planes, greedy, replaced, dropped }
 }
 
@@ -121,7 +134,7 @@ impl Search<'_> {
         gain >= self.options.min_gain * self.pairs.shadow_weight
     }
 
-    fn greedy(&self, progress: &mut dyn FnMut(usize)) -> Vec<Mask> {
+    fn greedy(&self, judge: &mut dyn FnMut(&[Mask]) -> Verdict) -> (Vec<Mask>, Verdict) {
         let mut planes: Vec<Mask> = Vec::new();
         let mut open = self.pairs.clone();
         let mut bounds = vec![f64::INFINITY; self.candidates.len()];
@@ -132,9 +145,11 @@ impl Search<'_> {
             }
             open = uncovered(&open, &[&mask]);
             planes.push(mask);
-            progress(planes.len());
+            if judge(&planes) == Verdict::Enough {
+                return (planes, Verdict::Enough);
+            }
         }
-        planes
+        (planes, Verdict::Continue)
     }
 
     /// Takes each plane out and puts the best one found back; returns the number of exchanges.
@@ -158,21 +173,42 @@ impl Search<'_> {
         exchanges
     }
 
-    /// Drops planes that gain too little given the others, the least useful first.
+    /// What each plane gains given the others.
+    fn gains(&self, planes: &[Mask]) -> Vec<f64> {
+        let gain = |k: usize| {
+            let others: Vec<&Mask> = planes.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, m)| m).collect();
+            score(&uncovered(self.pairs, &others), &planes[k].plane, self.options.texels).gain
+        };
+        (0..planes.len()).map(gain).collect()
+    }
+
+    /// Drops planes that gain too little given the others, the least useful first; returns how many.
     fn drop_unpaid(&self, planes: &mut Vec<Mask>) -> usize {
         let before = planes.len();
         loop {
-            let gain_of = |k: usize| {
-                let others: Vec<&Mask> = planes.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, m)| m).collect();
-                score(&uncovered(self.pairs, &others), &planes[k].plane, self.options.texels).gain
-            };
-            let gains: Vec<f64> = (0..planes.len()).map(gain_of).collect();
-            let least = (0..planes.len()).min_by(|&a, &b| gains[a].total_cmp(&gains[b]));
-            match least {
+            let gains = self.gains(planes);
+            match least(&gains) {
                 Some(k) if !self.worth(gains[k]) => planes.remove(k),
                 _ => return before - planes.len(),
             };
         }
+    }
+
+    /// Takes the least useful plane out and lets the others move, as long as `judge` finds the rest good enough;
+    /// returns how many went.
+    fn shrink(&self, planes: &mut Vec<Mask>, judge: &mut dyn FnMut(&[Mask]) -> Verdict) -> usize {
+        let before = planes.len();
+        while planes.len() > 1 {
+            let mut fewer = planes.clone();
+            let Some(k) = least(&self.gains(&fewer)) else { break };
+            fewer.remove(k);
+            self.replace_round(&mut fewer);
+            if judge(&fewer) == Verdict::Continue {
+                break;
+            }
+            *planes = fewer;
+        }
+        before - planes.len()
     }
 
     /// The best plane for pairs that nothing covers. `bounds` holds each candidate's last screening gain (a lazy
@@ -259,6 +295,11 @@ impl Search<'_> {
         let tight = score(open, &plane, texels);
         Some((tight.gain, best_mask(open, &plane, tight.side, texels)))
     }
+}
+
+/// Index of the smallest number.
+fn least(gains: &[f64]) -> Option<usize> {
+    (0..gains.len()).min_by(|&a, &b| gains[a].total_cmp(&gains[b]))
 }
 
 fn pose(candidate: &Candidate) -> Pose {

@@ -1,0 +1,290 @@
+//! The shadow asset: the model's own file with shadow planes and occluder textures inside, and back.
+//!
+//! [`write()`] takes an input model and baked planes and writes, into one folder, `STEM.shadow.glb` (the input
+//! with the glTF extension [`EXTENSION`]), `STEM.shadow.json` (the same set of planes with `uri`s in the place of
+//! texture indices) and `STEM.atlas-0.png`, ... [`read()`] takes any of these, checks it, and gives the set back.
+//! [`read_plane_file`] reads rectangles that a person placed.
+//!
+//! Numbers in the files are in model space, metres, f64 in the shortest spelling that stands for them; the solver's are
+//! in unit space and f32. No planes is legal and means "no self-shadow": the set is there, without textures.
+//!
+//! Guaranteed: every other byte of the input's JSON and buffers is kept (only `buffers[0].byteLength` changes);
+//! the input is never overwritten; files appear complete or not at all; the same request gives the same bytes.
+//! Not done: an input that carries the extension already is refused rather than edited, since its textures
+//! could only be left behind as dead weight. Fit the model that it was made from.
+
+pub mod atlas;
+pub mod files;
+pub mod glb;
+mod pointer;
+mod read;
+pub mod splice;
+pub mod uri;
+mod write;
+
+pub use atlas::Channel;
+pub use read::{ModelRectangle, read, read_plane_file};
+pub use write::{AssetRequest, Written, WrittenAtlas, check_input, write};
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use shadowfit_solver::{
+    mesh::Frame,
+    plane::{BakedPlane, OccluderTexture, ShadowPlane, Side},
+};
+use std::path::PathBuf;
+
+/// Name of the glTF extension. Listed in `extensionsUsed`, never in `extensionsRequired`.
+pub const EXTENSION: &str = "SHADOWFIT_node_shadow_planes";
+
+/// Axes whose angle has a smaller sine count as parallel. At 1e-6 (0.2 arc seconds) the rounding of f32 axes is
+/// already a tenth of the angle; a sheared node in a real file stays above 1e-2.
+const MIN_AXIS_SINE: f64 = 1e-6;
+
+/// A box in model space, metres.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Bounds {
+    /// Smallest coordinates.
+    pub min: DVec3,
+    /// Largest coordinates.
+    pub max: DVec3,
+}
+
+/// How a texel is to be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Encoding {
+    /// 0 is open, 255 blocks, bilinear in between.
+    Coverage,
+}
+
+impl Bounds {
+    /// Finite, and no side negative.
+    fn is_box(&self) -> bool {
+        self.min.is_finite() && self.max.is_finite() && self.min.cmple(self.max).all()
+    }
+}
+
+/// The extension's root object, and the whole of the sidecar.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Extension {
+    /// One set a model.
+    pub sets: Vec<PlaneSet>,
+}
+
+/// The planes of one model, as the file spells them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlaneSet {
+    /// Box of the receivers at bake time.
+    pub bounds: Bounds,
+    /// All planes.
+    pub planes: Vec<PlaneEntry>,
+    /// Indices into `planes`, one list a section.
+    pub sections: Vec<Vec<usize>>,
+}
+
+/// One plane, as the file spells it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct PlaneEntry {
+    /// Where texel (0, 0) starts.
+    pub origin: DVec3,
+    /// Edge along the texture's rows, full length.
+    pub u_axis: DVec3,
+    /// Edge along the texture's columns, full length.
+    pub v_axis: DVec3,
+    /// The atlas.
+    pub occluder_texture: TextureRef,
+    /// `[x, y, width, height]` in the atlas, texels.
+    pub region: [u32; 4],
+    /// The atlas's channel.
+    pub channel: Channel,
+    /// What a texel means.
+    pub encoding: Encoding,
+    /// Which receivers the plane serves.
+    pub side: Side,
+    /// A receiver nearer than this along the ray is not shadowed, metres.
+    pub bias: f64,
+}
+
+/// Which picture holds a texture: `{"index": 0}` in glTF, `{"uri": ".."}` in the sidecar.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TextureRef {
+    /// Index into the document's `textures`.
+    Index(usize),
+    /// Percent-encoded path relative to the sidecar.
+    Uri(String),
+}
+
+/// A rectangle (or parallelogram) in model space, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rectangle {
+    /// Corner with texture coordinates (0, 0).
+    pub origin: DVec3,
+    /// Edge along u, full length.
+    pub u_axis: DVec3,
+    /// Edge along v, full length.
+    pub v_axis: DVec3,
+}
+
+impl Rectangle {
+    /// The plane's rectangle in model space.
+    #[must_use]
+    pub fn from_unit_space(plane: &ShadowPlane, frame: &Frame) -> Self {
+        Self {
+            origin: frame.model_from_unit(plane.origin),
+            u_axis: plane.u.as_dvec3() * frame.radius,
+            v_axis: plane.v.as_dvec3() * frame.radius,
+        }
+    }
+
+    /// The rectangle as a plane of unit space.
+    #[must_use]
+    pub fn in_unit_space(&self, frame: &Frame) -> ShadowPlane {
+        let edge = |axis: DVec3| (axis / frame.radius).as_vec3();
+        ShadowPlane { origin: frame.unit_from_model(self.origin), u: edge(self.u_axis), v: edge(self.v_axis) }
+    }
+
+    /// What makes it no rectangle to look textures up in: the member of the file, and why.
+    fn fault(&self) -> Option<(&'static str, &'static str)> {
+        let [o, u, v] = [self.origin, self.u_axis, self.v_axis];
+        for (name, vector) in [("origin", o), ("uAxis", u), ("vAxis", v)] {
+            if !vector.is_finite() {
+                return Some((name, "not a finite number"));
+            }
+        }
+        // Directions first: lengths of 1e200 must not overflow, lengths of 1e-200 must not vanish.
+        let direction = |axis: DVec3| (axis / axis.abs().max_element()).normalize_or_zero();
+        let sine = direction(u).cross(direction(v)).length();
+        // Written so that NaN (an axis of length zero) is a fault.
+        let spans = sine >= MIN_AXIS_SINE;
+        (!spans).then_some(("vAxis", "parallel to uAxis, or one of the two has no length"))
+    }
+}
+
+/// One plane of a [`ShadowSet`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelPlane {
+    /// Where it lies.
+    pub rectangle: Rectangle,
+    /// What it blocks.
+    pub texture: OccluderTexture,
+    /// Which receivers it serves.
+    pub side: Side,
+    /// A receiver nearer than this along the ray is not shadowed, metres.
+    pub bias: f64,
+}
+
+/// The planes of one model, read back and checked, in model space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShadowSet {
+    /// Box of the receivers at bake time.
+    pub bounds: Bounds,
+    /// All planes; empty means "no self-shadow".
+    pub planes: Vec<ModelPlane>,
+    /// Indices into `planes`, one list a section.
+    pub sections: Vec<Vec<usize>>,
+}
+
+impl ShadowSet {
+    /// The planes as the solver and the renderer use them.
+    #[must_use]
+    pub fn in_unit_space(&self, frame: &Frame) -> Vec<BakedPlane> {
+        let baked = |plane: &ModelPlane| BakedPlane {
+            plane: plane.rectangle.in_unit_space(frame),
+            texture: plane.texture.clone(),
+            side: plane.side,
+            bias: (plane.bias / frame.radius) as f32,
+        };
+        self.planes.iter().map(baked).collect()
+    }
+}
+
+/// Why an asset cannot be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum AssetError {
+    /// The file system says no.
+    #[error("cannot {action} {}: {source}", .path.display())]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// With which file.
+        path: PathBuf,
+        /// The reason.
+        source: std::io::Error,
+    },
+    /// An output path names a file that the model is made of.
+    #[error("{} is a file of the input and is never overwritten: choose another output folder", .path.display())]
+    OverwritesInput {
+        /// The output path.
+        path: PathBuf,
+    },
+    /// A file that the model needs cannot be copied without destroying another one.
+    #[error("{} exists with other contents than the file that the model uses: remove it or choose another output folder", .path.display())]
+    Occupied {
+        /// The output path.
+        path: PathBuf,
+    },
+    /// Not the expected container or text.
+    #[error("{}: {why}", .path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        why: String,
+    },
+    /// A place in a JSON document is wrong.
+    #[error("{}: {pointer}: {why}", .path.display())]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// JSON pointer.
+        pointer: String,
+        /// What is wrong there.
+        why: String,
+    },
+    /// The input went through this program before.
+    #[error("{}: {pointer}: carries {EXTENSION} already: fit the model that it was made from", .path.display())]
+    AlreadyFitted {
+        /// The file.
+        path: PathBuf,
+        /// JSON pointer.
+        pointer: String,
+    },
+    /// The stem is no file name.
+    #[error("{stem:?} cannot be the start of a file name")]
+    Stem {
+        /// As given.
+        stem: String,
+    },
+    /// A baked plane that no file can hold.
+    #[error("shadow plane {plane}: {why}")]
+    Plane {
+        /// Index in the request.
+        plane: usize,
+        /// What is wrong.
+        why: String,
+    },
+    /// The receivers' box is empty or not finite.
+    #[error("the receivers' box is not one: {bounds:?}")]
+    Bounds {
+        /// As given.
+        bounds: Bounds,
+    },
+    /// The PNG encoder failed.
+    #[error("cannot encode an atlas: {0}")]
+    Encode(image::ImageError),
+}
+
+impl AssetError {
+    /// The program's exit code: 2 input or output, 3 invalid input, 4 a fault of the planes, not of the files.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Io { .. } | Self::OverwritesInput { .. } | Self::Occupied { .. } => 2,
+            Self::Malformed { .. } | Self::Invalid { .. } | Self::AlreadyFitted { .. } | Self::Stem { .. } => 3,
+            Self::Plane { .. } | Self::Bounds { .. } | Self::Encode(_) => 4,
+        }
+    }
+}

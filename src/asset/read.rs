@@ -1,0 +1,291 @@
+//! `STEM.shadow.glb`, any glTF with the extension, or the sidecar -> [`ShadowSet`]; and plane files.
+//!
+//! Every index, region, word and number is checked before it is used, and a complaint names the JSON pointer.
+//! In glTF the planes lie in the space of the frame node, the one node that carries `{"set": i}`; its transform
+//! and those of the nodes above it are applied, so that a tool may move the whole model.
+
+use super::{
+    AssetError, Bounds, Channel, EXTENSION, Encoding, ModelPlane, Rectangle, ShadowSet, atlas, files, glb, pointer::At,
+    uri,
+};
+use glam::{DMat4, DQuat, DVec3};
+use image::{ImageFormat, ImageReader, RgbImage};
+use serde::Deserialize;
+use serde_json::Value;
+use shadowfit_solver::plane::{OccluderTexture, Side};
+use std::{collections::BTreeMap, io::Cursor, path::Path};
+
+/// Reads the shadow planes of a GLB, a glTF or a sidecar.
+///
+/// # Errors
+/// The file cannot be read or is none of these; no set of planes, or more than one; anything in it that is
+/// wrong, with its JSON pointer.
+pub fn read(path: &Path) -> Result<ShadowSet, AssetError> {
+    let bytes = files::read(path)?;
+    let malformed = |why: String| AssetError::Malformed { path: path.into(), why };
+    let (json, bin) = if bytes.starts_with(glb::MAGIC) {
+        let chunks = glb::split(&bytes).map_err(malformed)?;
+        (chunks.json, chunks.bin)
+    } else {
+        let text = std::str::from_utf8(&bytes).map_err(|e| malformed(format!("neither GLB nor UTF-8 text: {e}")))?;
+        (text.trim_start_matches('\u{feff}'), None)
+    };
+    let value: Value = serde_json::from_str(json).map_err(|e| malformed(format!("not JSON: {e}")))?;
+    let root = At::root(path, &value);
+    let mut atlases = Atlases { path, root: root.clone(), bin, decoded: BTreeMap::new() };
+    if value.get("asset").is_none() {
+        // The sidecar is already in model space.
+        let sets = root.member("sets")?;
+        return match sets.elements()?.as_slice() {
+            [set] => read_set(set, &mut atlases),
+            others => Err(sets.error(format!("one set expected, found {}", others.len()))),
+        };
+    }
+    let (index, model_from_frame) = frame_node(&root)?;
+    let sets = root.member("extensions")?.member(EXTENSION)?.member("sets")?.elements()?;
+    let mut set = read_set(&index.follow(&sets)?, &mut atlases)?;
+    if model_from_frame != DMat4::IDENTITY {
+        set.transform(&model_from_frame);
+    }
+    Ok(set)
+}
+
+fn read_set(at: &At<'_>, atlases: &mut Atlases<'_>) -> Result<ShadowSet, AssetError> {
+    let box_at = at.member("bounds")?;
+    let bounds = Bounds { min: box_at.member("min")?.parse()?, max: box_at.member("max")?.parse()? };
+    if !bounds.is_box() {
+        return Err(box_at.error("min is above max".into()));
+    }
+    let entries = at.member("planes")?.elements()?;
+    let planes = entries.iter().map(|entry| read_plane(entry, atlases)).collect::<Result<Vec<_>, _>>()?;
+    let mut sections = Vec::new();
+    for section in at.member("sections")?.elements()? {
+        let indices = section.elements()?;
+        indices.iter().try_for_each(|index| index.follow(&entries).map(|_| ()))?;
+        sections.push(section.parse()?);
+    }
+    Ok(ShadowSet { bounds, planes, sections })
+}
+
+fn read_plane(at: &At<'_>, atlases: &mut Atlases<'_>) -> Result<ModelPlane, AssetError> {
+    let rectangle = Rectangle {
+        origin: at.member("origin")?.parse()?,
+        u_axis: at.member("uAxis")?.parse()?,
+        v_axis: at.member("vAxis")?.parse()?,
+    };
+    if let Some((member, why)) = rectangle.fault() {
+        return Err(at.member(member)?.error(why.into()));
+    }
+    let _: Encoding = at.member("encoding")?.parse()?;
+    let side: Side = at.member("side")?.parse()?;
+    let bias: f64 = at.member("bias")?.parse()?;
+    if !(bias.is_finite() && bias >= 0.0) {
+        return Err(at.member("bias")?.error("not a finite number from 0 up".into()));
+    }
+    let channel: Channel = at.member("channel")?.parse()?;
+    let atlas = atlases.get(&at.member("occluderTexture")?)?;
+    let texture = crop(atlas, &at.member("region")?, channel)?;
+    Ok(ModelPlane { rectangle, texture, side, bias })
+}
+
+/// One channel of a region of an atlas.
+fn crop(atlas: &RgbImage, region: &At<'_>, channel: Channel) -> Result<OccluderTexture, AssetError> {
+    let [x, y, w, h]: [u32; 4] = region.parse()?;
+    let inside = |start: u32, size: u32, limit: u32| start.checked_add(size).is_some_and(|end| end <= limit);
+    if !inside(x, w, atlas.width()) || !inside(y, h, atlas.height()) {
+        return Err(region.error(format!("not inside the texture of {} x {}", atlas.width(), atlas.height())));
+    }
+    let texels = (y..y + h).flat_map(|row| (x..x + w).map(move |column| (column, row)));
+    let coverage = texels.map(|(column, row)| atlas.get_pixel(column, row)[channel as usize]).collect();
+    let texture = OccluderTexture { width: w as usize, height: h as usize, coverage };
+    atlas::checked_size(&texture).map_err(|why| region.error(why))?;
+    Ok(texture)
+}
+
+/// Pictures of a document, decoded once each.
+struct Atlases<'a> {
+    path: &'a Path,
+    root: At<'a>,
+    bin: Option<&'a [u8]>,
+    decoded: BTreeMap<String, RgbImage>,
+}
+
+impl Atlases<'_> {
+    /// The picture that an `occluderTexture` names.
+    fn get(&mut self, reference: &At<'_>) -> Result<&RgbImage, AssetError> {
+        let name = reference.optional("uri").map_or_else(|| reference.member("index"), Ok)?;
+        let key = name.parse::<Value>()?.to_string();
+        if !self.decoded.contains_key(&key) {
+            let png =
+                if reference.optional("uri").is_some() { self.uri_bytes(&name)? } else { self.texture_bytes(&name)? };
+            let picture = ImageReader::with_format(Cursor::new(png), ImageFormat::Png).decode();
+            let picture = picture.map_err(|e| name.error(format!("cannot decode the texture: {e}")))?;
+            self.decoded.insert(key.clone(), picture.into_rgb8());
+        }
+        self.decoded.get(&key).ok_or_else(|| name.error("the texture is missing".into()))
+    }
+
+    /// Bytes of the image of a glTF texture.
+    fn texture_bytes(&self, index: &At<'_>) -> Result<Vec<u8>, AssetError> {
+        let texture = index.follow(&self.root.optional_elements("textures")?)?;
+        let image = texture.member("source")?.follow(&self.root.optional_elements("images")?)?;
+        if let Some(uri) = image.optional("uri") {
+            return self.uri_bytes(&uri);
+        }
+        let view = image.member("bufferView")?.follow(&self.root.optional_elements("bufferViews")?)?;
+        let buffer = view.member("buffer")?.follow(&self.root.optional_elements("buffers")?)?;
+        let offset: usize = view.optional("byteOffset").map_or(Ok(0), |offset| offset.parse())?;
+        let length: usize = view.member("byteLength")?.parse()?;
+        let loaded;
+        let bytes = match (buffer.optional("uri"), self.bin) {
+            (Some(uri), _) => {
+                loaded = self.uri_bytes(&uri)?;
+                loaded.as_slice()
+            }
+            (None, Some(bin)) => bin,
+            (None, None) => return Err(buffer.error("neither a uri nor a binary chunk".into())),
+        };
+        let range = offset..offset.saturating_add(length);
+        let part = bytes.get(range).ok_or_else(|| view.error("not inside its buffer".into()))?;
+        Ok(part.to_vec())
+    }
+
+    /// Contents of a `data:` URI or of a file below the document's folder.
+    fn uri_bytes(&self, at: &At<'_>) -> Result<Vec<u8>, AssetError> {
+        let uri: String = at.parse()?;
+        if uri::is_data(&uri) {
+            return uri::data(&uri).ok_or_else(|| at.error("not base64".into()));
+        }
+        let file = files::locate(self.path, &uri).map_err(|why| at.error(why))?;
+        files::read(&file.source)
+    }
+}
+
+/// The `set` of the frame node, and the transform from its space to model space.
+fn frame_node<'a>(root: &At<'a>) -> Result<(At<'a>, DMat4), AssetError> {
+    let nodes = root.optional_elements("nodes")?;
+    let label = |node: &At<'a>| node.optional("extensions").and_then(|e| e.optional(EXTENSION));
+    let frames: Vec<usize> = (0..nodes.len()).filter(|&i| label(&nodes[i]).is_some()).collect();
+    let (frame, set) = match frames.as_slice() {
+        [frame] => (*frame, nodes[*frame].member("extensions")?.member(EXTENSION)?.member("set")?),
+        _ => return Err(root.error(format!("{} nodes carry {EXTENSION}, one expected", frames.len()))),
+    };
+    let mut parents = vec![None; nodes.len()];
+    for (i, node) in nodes.iter().enumerate() {
+        for child in node.optional_elements("children")? {
+            child.follow(&nodes)?;
+            parents[child.parse::<usize>()?] = Some(i);
+        }
+    }
+    let mut model_from_frame = local_transform(&nodes[frame])?;
+    let mut node = frame;
+    let mut height = 0;
+    while let Some(parent) = parents[node] {
+        height += 1;
+        if height > nodes.len() {
+            return Err(nodes[frame].error("the node is its own ancestor".into()));
+        }
+        model_from_frame = local_transform(&nodes[parent])? * model_from_frame;
+        node = parent;
+    }
+    let determinant = model_from_frame.determinant();
+    if !(model_from_frame.is_finite() && determinant.is_finite() && determinant != 0.0) {
+        return Err(nodes[frame].error("the node's transform has no inverse".into()));
+    }
+    Ok((set, model_from_frame))
+}
+
+/// A node's own transform.
+fn local_transform(node: &At<'_>) -> Result<DMat4, AssetError> {
+    if let Some(matrix) = node.optional("matrix") {
+        return Ok(DMat4::from_cols_array(&matrix.parse()?));
+    }
+    let vector = |key: &str, default| node.optional(key).map_or(Ok(default), |at| at.parse::<DVec3>());
+    let rotation = node.optional("rotation").map_or(Ok(DQuat::IDENTITY), |at| at.parse::<DQuat>())?;
+    let (scale, translation) = (vector("scale", DVec3::ONE)?, vector("translation", DVec3::ZERO)?);
+    Ok(DMat4::from_scale_rotation_translation(scale, rotation.normalize(), translation))
+}
+
+impl ShadowSet {
+    /// Moves the set by an affine transform.
+    fn transform(&mut self, matrix: &DMat4) {
+        let determinant = matrix.determinant();
+        for plane in &mut self.planes {
+            let rectangle = &mut plane.rectangle;
+            rectangle.origin = matrix.transform_point3(rectangle.origin);
+            rectangle.u_axis = matrix.transform_vector3(rectangle.u_axis);
+            rectangle.v_axis = matrix.transform_vector3(rectangle.v_axis);
+            // A bias has no direction: the mean scale is the best there is.
+            plane.bias *= determinant.abs().cbrt();
+            // A mirror turns u x v to the other side of the plane.
+            plane.side = match plane.side {
+                Side::Front if determinant < 0.0 => Side::Back,
+                Side::Back if determinant < 0.0 => Side::Front,
+                side => side,
+            };
+        }
+        let Bounds { min, max } = self.bounds;
+        let corner =
+            |i: usize| DVec3::from_array([0, 1, 2].map(|axis| if i >> axis & 1 == 0 { min[axis] } else { max[axis] }));
+        let corners = (0..8).map(|i| matrix.transform_point3(corner(i)));
+        let (low, high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (min, max) = corners.fold((low, high), |(low, high), p| (low.min(p), high.max(p)));
+        self.bounds = Bounds { min, max };
+    }
+}
+
+/// A rectangle that a person placed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelRectangle {
+    /// What the person calls it.
+    pub name: Option<String>,
+    /// Where it lies.
+    pub rectangle: Rectangle,
+    /// Which receivers it serves.
+    pub side: Side,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlaneFile {
+    #[serde(rename = "comment")]
+    _comment: Option<String>,
+    #[serde(rename = "planes")]
+    _planes: Vec<Value>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "camelCase")]
+struct PlaneFileEntry {
+    name: Option<String>,
+    origin: DVec3,
+    u_axis: DVec3,
+    v_axis: DVec3,
+    #[serde(default)]
+    side: Side,
+}
+
+/// Reads the rectangles of a `--planes` file: `{"comment": "..", "planes": [{"name": "..", "origin": [x, y, z],
+/// "uAxis": [..], "vAxis": [..], "side": "both|front|back"}]}`, model space, metres. `comment`, `name` and `side`
+/// may be left out.
+///
+/// # Errors
+/// The file cannot be read; an unknown member; axes that are parallel.
+pub fn read_plane_file(path: &Path) -> Result<Vec<ModelRectangle>, AssetError> {
+    let bytes = files::read(path)?;
+    let malformed = |e: serde_json::Error| AssetError::Malformed { path: path.into(), why: format!("not JSON: {e}") };
+    let root: Value = serde_json::from_slice(&bytes).map_err(malformed)?;
+    // The outer object is checked for unknown members; the planes one by one, so that each is named.
+    let _: PlaneFile = At::root(path, &root).parse()?;
+    let list = At::root(path, &root).member("planes")?.elements()?;
+    let mut rectangles = Vec::with_capacity(list.len());
+    for at in list {
+        let PlaneFileEntry { name, origin, u_axis, v_axis, side } = at.parse()?;
+        let rectangle = Rectangle { origin, u_axis, v_axis };
+        if let Some((member, why)) = rectangle.fault() {
+            return Err(at.member(member)?.error(why.into()));
+        }
+        rectangles.push(ModelRectangle { name, rectangle, side });
+    }
+    Ok(rectangles)
+}

@@ -1,0 +1,264 @@
+//! The command line: raw arguments, checked into requests, run, and answered with an exit code.
+
+use crate::{
+    asset,
+    pipeline::{self, Effort, FitError, FitRequest},
+    render::{Antialias, Camera, FrameOptions, FrameRequest, Light, Mode, RenderError, cpu, gpu::Gpu, turntable},
+    scene,
+    validation::ValidationOptions,
+};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use shadowfit_solver::{lights::direction, mesh::Mesh};
+use std::{io::IsTerminal, path::PathBuf, time::Duration};
+
+/// Finds shadow planes through a 3D model and bakes occluder textures on them: self-shadows for any light in one
+/// pass, without a shadow map.
+#[derive(Debug, Parser)]
+#[command(version, about, max_term_width = 110)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Fit shadow planes to a model (.glb or .gltf) and write the asset, its report and a comparison picture.
+    Fit(FitArgs),
+    /// Draw a fitted asset to a PNG.
+    Render(RenderArgs),
+}
+
+#[derive(Debug, Args)]
+struct FitArgs {
+    /// The model: .glb or .gltf.
+    model: PathBuf,
+    /// Folder of the output; made where it is missing.
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
+    /// Most planes [default: 12; with --max-error: 64].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=200))]
+    max_planes: Option<u16>,
+    /// Find the fewest planes whose held-out shadow_error is at most this; exit code 6 where that fails.
+    #[arg(long, value_name = "E", value_parser = error_share)]
+    max_error: Option<f64>,
+    /// Texels along the longer side of each plane [default: by preset, 128 (fast) or 256].
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(8..=2048))]
+    texture_size: Option<u16>,
+    /// Light directions to serve: sphere, hemisphere, or cone:AZIMUTH,ELEVATION,HALF_ANGLE in degrees.
+    #[arg(long, value_name = "DOMAIN", default_value = "sphere")]
+    lights: String,
+    /// How much work to do.
+    #[arg(long, value_enum, default_value_t = Preset::Balanced)]
+    preset: Preset,
+    /// Bake the rectangles of this JSON file instead of searching.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["max_planes", "max_error"])]
+    planes: Option<PathBuf>,
+    /// Frames to render and compare: none, short (4 views x 2 lights, 512 px) or full (8 x 8, 1024 px).
+    #[arg(long, value_enum, default_value_t = Validate::Short)]
+    validate: Validate,
+    /// Seed of all sampling: the same seed gives the same bytes.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+    /// Threads [default: one a core]. The result does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Print the report as one JSON object instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Preset {
+    Fast,
+    Balanced,
+    Best,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Validate {
+    None,
+    Short,
+    Full,
+}
+
+#[derive(Debug, Args)]
+struct RenderArgs {
+    /// The asset: STEM.shadow.glb.
+    asset: PathBuf,
+    /// The picture to write.
+    #[arg(short, long, value_name = "PNG")]
+    out: PathBuf,
+    /// Where the light is, seen from the model: azimuth (0 = +Z, 90 = +X) and elevation, degrees.
+    #[arg(long, value_name = "AZ,EL", default_value = "35,40", value_parser = angles, allow_hyphen_values = true)]
+    light: [f32; 2],
+    /// Where the camera is, seen from the model: azimuth and elevation, degrees.
+    #[arg(long, value_name = "AZ,EL", default_value = "30,20", value_parser = angles, allow_hyphen_values = true)]
+    view: [f32; 2],
+    /// Width and height in pixels.
+    #[arg(long, value_name = "PX", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(16..=8192))]
+    size: u32,
+    /// What to draw: the shaded model, the raw visibility, or the model with its planes.
+    #[arg(long, value_enum, default_value_t = Picture::Shaded)]
+    mode: Picture,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Picture {
+    Shaded,
+    Mask,
+    Planes,
+}
+
+/// Why a command failed.
+#[derive(Debug, thiserror::Error)]
+pub enum CliError {
+    /// Arguments that do not fit together.
+    #[error("{0}")]
+    Usage(String),
+    /// The fit failed.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// The result is written, but not as good as asked for.
+    #[error("shadow_error {found:.4} is above --max-error {wanted}: allow more planes or texels (--max-planes, --texture-size, --preset best)")]
+    Target {
+        /// Held-out error reached.
+        found: f64,
+        /// Error asked for.
+        wanted: f64,
+    },
+}
+
+impl CliError {
+    /// The program's exit code.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Usage(_) => 1,
+            Self::Fit(error) => error.exit_code(),
+            Self::Target { .. } => 6,
+        }
+    }
+}
+
+/// A share of the shadow energy: above 0, at most 1.
+fn error_share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(share) if share > 0.0 && share <= 1.0 => Ok(share),
+        _ => Err("a number above 0 and at most 1 is needed".to_string()),
+    }
+}
+
+/// `AZ,EL` in degrees, as radians.
+fn angles(text: &str) -> Result<[f32; 2], String> {
+    let numbers: Vec<f32> = text.split(',').filter_map(|n| n.trim().parse().ok()).collect();
+    match numbers[..] {
+        [az, el] if text.split(',').count() == 2 && az.is_finite() && el.abs() <= 90.0 => {
+            Ok([az.to_radians(), el.to_radians()])
+        }
+        _ => Err("AZIMUTH,ELEVATION in degrees is needed, elevation from -90 to 90".to_string()),
+    }
+}
+
+/// Runs a parsed command line; `command` is its text, for the report.
+///
+/// # Errors
+/// See [`CliError`].
+pub fn run(cli: Cli, command: String) -> Result<(), CliError> {
+    match cli.command {
+        Command::Fit(args) => fit(args, command),
+        Command::Render(args) => render(&args),
+    }
+}
+
+fn fit(args: FitArgs, command: String) -> Result<(), CliError> {
+    let domain = args.lights.parse().map_err(|error| CliError::Usage(format!("--lights: {error}")))?;
+    if let Some(threads) = args.threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
+        pool.map_err(|error| CliError::Usage(format!("--threads: {error}")))?;
+    }
+    let request = FitRequest {
+        model: args.model,
+        out_dir: args.out,
+        effort: match args.preset {
+            Preset::Fast => Effort::fast(),
+            Preset::Balanced => Effort::balanced(),
+            Preset::Best => Effort::best(),
+        },
+        max_planes: args.max_planes.map(usize::from),
+        max_error: args.max_error,
+        texture_size: args.texture_size.map(usize::from),
+        domain,
+        domain_text: args.lights,
+        planes: args.planes,
+        validation: match args.validate {
+            Validate::None => None,
+            Validate::Short => Some(ValidationOptions::short()),
+            Validate::Full => Some(ValidationOptions::full()),
+        },
+        seed: args.seed,
+        command,
+    };
+    let bar = progress_bar();
+    let outcome = pipeline::run(&request, &mut |message| bar.set_message(message));
+    bar.finish_and_clear();
+    let report = outcome?;
+    if args.json {
+        let json = serde_json::to_string(&report).map_err(FitError::Report)?;
+        println!("{json}");
+    } else {
+        print!("{report}");
+    }
+    match request.max_error {
+        Some(wanted) if report.held_out.shadow_error > wanted => {
+            Err(CliError::Target { found: report.held_out.shadow_error, wanted })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A spinner on a terminal, nothing elsewhere.
+fn progress_bar() -> ProgressBar {
+    if !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new_spinner();
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed_precise} {msg}") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(120));
+    bar
+}
+
+/// Draws an asset: with wgpu, or with the CPU twin where there is no adapter.
+fn render(args: &RenderArgs) -> Result<(), CliError> {
+    let scene = scene::load(&args.asset).map_err(FitError::Scene)?;
+    let mesh = Mesh::new(&scene.soup).map_err(|source| FitError::Mesh { path: args.asset.clone(), source })?;
+    let planes = asset::read(&args.asset).map_err(FitError::Asset)?.in_unit_space(&mesh.frame);
+    let (mode, antialias) = match args.mode {
+        Picture::Shaded => (Mode::Shaded, Antialias::Msaa4),
+        Picture::Mask => (Mode::Mask, Antialias::Off),
+        Picture::Planes => (Mode::Planes, Antialias::Msaa4),
+    };
+    let request = FrameRequest {
+        camera: Camera::turntable(args.view[0], args.view[1]),
+        light: Light::Directional { to_light: direction(args.light[0], args.light[1]) },
+        options: FrameOptions { size_px: [args.size; 2], mode, antialias },
+    };
+    let on_gpu = || {
+        let mut turntable = turntable::Turntable::new(&Gpu::new()?, &scene, &mesh.frame)?;
+        turntable.set_planes(&planes)?;
+        turntable.render(&request)
+    };
+    let picture = match on_gpu() {
+        Err(RenderError::NoAdapter | RenderError::Device { .. } | RenderError::TooLarge { .. }) => {
+            tracing::warn!("no graphics adapter can draw this: drawing with the CPU");
+            let mut turntable = cpu::Turntable::new(&scene, &mesh);
+            turntable.set_planes(&planes);
+            turntable.render(&request)
+        }
+        outcome => outcome,
+    };
+    pipeline::write_png(&args.out, &picture.map_err(FitError::Render)?)?;
+    Ok(())
+}
