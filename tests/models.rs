@@ -4,11 +4,11 @@
 #[path = "../examples/make_models/catalogue.rs"]
 mod catalogue;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use catalogue::{
-    analytic,
+    aircraft, analytic,
     glb::Model,
     mesh::Mesh,
     planes::{PlaneFile, Rectangle},
@@ -74,6 +74,7 @@ fn assert_closed(name: &str, mesh: &Mesh) {
 fn all_models() -> Vec<Model> {
     vec![
         teapot::model(),
+        aircraft::model(),
         analytic::plate_over_ground(),
         analytic::sphere(),
         analytic::cuboid(),
@@ -93,7 +94,9 @@ fn committed_files_are_what_the_generator_writes() {
 
 #[test]
 fn models_load_as_gltf_with_the_expected_triangles() {
-    for (file, model) in [("teapot.glb", teapot::model()), ("sphere.glb", analytic::sphere())] {
+    for (file, model) in
+        [("teapot.glb", teapot::model()), ("aircraft.glb", aircraft::model()), ("sphere.glb", analytic::sphere())]
+    {
         let document = gltf::Gltf::from_slice(&model.to_glb()).unwrap();
         let primitives = document.meshes().flat_map(|m| m.primitives().collect::<Vec<_>>());
         let indices: usize = primitives.map(|p| p.indices().unwrap().count()).sum();
@@ -112,7 +115,8 @@ fn no_triangle_is_degenerate() {
 
 #[test]
 fn triangle_counts_are_as_documented() {
-    let expected = [("teapot", 6436), ("plate_over_ground", 4), ("sphere", 980), ("box", 12), ("t_shape", 28)];
+    let expected =
+        [("teapot", 6436), ("aircraft", 7504), ("plate_over_ground", 4), ("sphere", 980), ("box", 12), ("t_shape", 28)];
     let counts: BTreeMap<_, _> = all_models().iter().map(|m| (m.name, m.triangle_count())).collect();
     for (name, triangles) in expected {
         assert_eq!(counts[name], triangles, "{name}");
@@ -148,6 +152,68 @@ fn teapot_has_newells_proportions() {
     // The spout's lip bulges between control points, so its x is only bounded by them.
     assert!((min - DVec3::new(-3.0, 0.0, -2.0)).abs().max_element() < 1e-3, "{min}");
     assert!((max.y - 3.15).abs() < 1e-3 && (max.z - 2.0).abs() < 1e-3 && (3.4..3.525).contains(&max.x), "{max}");
+}
+
+#[test]
+fn aircraft_is_made_of_closed_pieces() {
+    let mesh = whole(&aircraft::model());
+    // Body, spine, canopy, nozzle, and on each side intake, boom, wing, stabiliser, fin.
+    assert_eq!(components(&mesh).len(), 14);
+    assert_closed("aircraft", &mesh);
+}
+
+#[test]
+fn aircraft_is_mirror_symmetric() {
+    // The nose apex and the rings lie on x = 0 or in pairs, so the mirror image has the same set of vertices.
+    let key = |p: DVec3| (p * 1e6).round().to_array().map(|c| c as i64);
+    let mesh = whole(&aircraft::model());
+    let vertices: BTreeSet<_> = mesh.positions.iter().map(|&p| key(p)).collect();
+    let lonely = mesh.positions.iter().filter(|p| !vertices.contains(&key(DVec3::new(-p.x, p.y, p.z))));
+    assert_eq!(lonely.count(), 0);
+}
+
+/// Every vertex of the mesh must have a mirror image in the plane, within a millimetre.
+fn assert_symmetric_about(plane: &Rectangle, points: &[DVec3]) {
+    let normal = plane.normal();
+    for &p in points {
+        let image = p - normal * 2.0 * plane.coordinates(p).2;
+        let gap = points.iter().map(|q| q.distance(image)).fold(f64::INFINITY, f64::min);
+        assert!(gap < 1e-3, "{}: {p} has its nearest mirror image {gap} m off", plane.name);
+    }
+}
+
+#[test]
+fn fins_lie_in_the_published_planes() {
+    let planes = aircraft::plane_file().planes;
+    let published = DVec3::new(-0.917594, 0.0, 0.397518);
+    let normal = planes[1].normal();
+    assert!(normal.abs_diff_eq(aircraft::model_from_aircraft(published), 1e-6), "{normal}");
+    let right = aircraft::right_fin();
+    for (plane, fin) in [(&planes[1], right.clone()), (&planes[2], right.mirrored_x())] {
+        let points = fin.mapped(aircraft::model_from_aircraft).positions;
+        assert_symmetric_about(plane, &points);
+        for &p in &points {
+            let (a, b, distance) = plane.coordinates(p);
+            assert!((0.0..1.0).contains(&a) && (0.0..1.0).contains(&b), "{}: {p} at ({a}, {b})", plane.name);
+            assert!(distance.abs() <= 0.1001, "{}: {p} lies {distance} m off the plane", plane.name);
+        }
+    }
+}
+
+#[test]
+fn horizontal_plane_holds_the_whole_plan_view() {
+    let plane = &aircraft::plane_file().planes[0];
+    let mesh = whole(&aircraft::model());
+    assert!(mesh.positions.iter().map(|&p| plane.coordinates(p)).all(|(a, b, _)| a.min(b) > 0.0 && a.max(b) < 1.0));
+    // Of each side's pieces, wing and stabiliser are the two that reach farthest out.
+    let reach = |m: &Mesh| m.triangles.iter().flatten().map(|&v| m.positions[v].x).fold(f64::NEG_INFINITY, f64::max);
+    let mut pieces = components(&mesh);
+    pieces.sort_by(|a, b| reach(b).total_cmp(&reach(a)));
+    for piece in &pieces[..2] {
+        let used: BTreeSet<usize> = piece.triangles.iter().flatten().copied().collect();
+        assert_symmetric_about(plane, &used.iter().map(|&v| piece.positions[v]).collect::<Vec<_>>());
+    }
+    assert!((5.3..5.4).contains(&reach(&pieces[0])), "half span {}", reach(&pieces[0]));
 }
 
 #[test]
@@ -240,5 +306,5 @@ fn plane_files_parse_and_keep_their_numbers() {
             }
         }
     };
-    [analytic::plate_planes(), planted::plane_file()].into_iter().for_each(check);
+    [analytic::plate_planes(), planted::plane_file(), aircraft::plane_file()].into_iter().for_each(check);
 }

@@ -1,8 +1,8 @@
 //! Indexed triangle meshes in double precision: welding, mirroring, and the split into shaded vertices.
 //!
 //! In: triangles from the generators. Out: vertices with normals, ready for a GLB file.
-//! Positions are snapped to a grid before anything is computed from them, because `sin`, `cos` and `powf` may differ
-//! in the last bit between platforms and the written bytes must not.
+//! `sin`, `cos` and `powf` may differ in the last bit between platforms, and the written bytes must not: their results
+//! go through `settled`, and positions are snapped to a grid before normals are computed from them.
 
 use std::collections::BTreeMap;
 
@@ -14,6 +14,14 @@ pub const MICROMETRE: f64 = 1e-6;
 pub const NANOMETRE: f64 = 1e-9;
 /// Grid of the normals (unit length), for the same reason.
 const NORMAL_GRID: f64 = 1e-5;
+
+/// Grid of the results of `sin`, `cos` and `powf` (about 1): far above their rounding noise, far below a micrometre.
+const SETTLED_STEPS: f64 = 1e12;
+
+/// A transcendental function's result without its last, platform-dependent bits.
+pub fn settled(value: f64) -> f64 {
+    (value * SETTLED_STEPS).round() / SETTLED_STEPS
+}
 
 /// Triangles that share vertices, counter-clockwise seen from outside.
 #[derive(Clone, Default)]

@@ -7,11 +7,13 @@ use std::f64::consts::TAU;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::glb::{Material, Model, Part, Sides};
-use super::mesh::{MICROMETRE, Mesh};
+use super::mesh::{MICROMETRE, Mesh, settled};
 use super::planes::{PlaneFile, Rectangle};
 
 /// Segments of the disc.
 const DISC_SEGMENTS: usize = 48;
+/// Radius of the disc, metres.
+const DISC_RADIUS_M: f64 = 0.45;
 /// Border of a plane around its plate, as a share of the longer edge: an open texel remains even at 32 texels.
 const MARGIN: f64 = 0.04;
 /// Flat plates have no smooth edge.
@@ -30,7 +32,8 @@ pub struct Plate {
 
 /// The K = 4 plates.
 pub fn plates() -> Vec<Plate> {
-    let disc = (0..DISC_SEGMENTS).map(|i| DVec2::from_angle(TAU * i as f64 / DISC_SEGMENTS as f64) * 0.45);
+    let disc = (0..DISC_SEGMENTS)
+        .map(|i| DVec2::from_angle(TAU * i as f64 / DISC_SEGMENTS as f64).map(settled) * DISC_RADIUS_M);
     let corners = |points: &[[f64; 2]]| points.iter().map(|&p| DVec2::from_array(p)).collect();
     let plate = |name, middle: [f64; 3], rotation: [f64; 4], outline_plate, base_color| Plate {
         name,
