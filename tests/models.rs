@@ -12,7 +12,7 @@ use catalogue::{
     glb::Model,
     mesh::Mesh,
     planes::{PlaneFile, Rectangle},
-    planted, teapot,
+    planted, teapot, teapot_planes,
 };
 use glam::DVec3;
 
@@ -28,6 +28,18 @@ fn whole(model: &Model) -> Mesh {
         mesh.append(&part.mesh);
     }
     mesh
+}
+
+/// Unit normal `u x v`.
+fn normal(plane: &Rectangle) -> DVec3 {
+    plane.u_axis.cross(plane.v_axis).normalize()
+}
+
+/// Texture coordinates (a, b) of the point's foot on the plane, and its signed distance in metres.
+fn coordinates(plane: &Rectangle, p: DVec3) -> (f64, f64, f64) {
+    let d = p - plane.origin;
+    let along = |axis: DVec3| d.dot(axis) / axis.length_squared();
+    (along(plane.u_axis), along(plane.v_axis), d.dot(normal(plane)))
 }
 
 /// Connected components, by shared vertices.
@@ -100,7 +112,7 @@ fn models_load_as_gltf_with_the_expected_triangles() {
         let document = gltf::Gltf::from_slice(&model.to_glb()).unwrap();
         let primitives = document.meshes().flat_map(|m| m.primitives().collect::<Vec<_>>());
         let indices: usize = primitives.map(|p| p.indices().unwrap().count()).sum();
-        assert_eq!(indices, 3 * model.triangle_count(), "{file}");
+        assert_eq!(indices, 3 * whole(&model).triangles.len(), "{file}");
     }
 }
 
@@ -117,7 +129,7 @@ fn no_triangle_is_degenerate() {
 fn triangle_counts_are_as_documented() {
     let expected =
         [("teapot", 6436), ("aircraft", 7504), ("plate_over_ground", 4), ("sphere", 980), ("box", 12), ("t_shape", 28)];
-    let counts: BTreeMap<_, _> = all_models().iter().map(|m| (m.name, m.triangle_count())).collect();
+    let counts: BTreeMap<_, _> = all_models().iter().map(|m| (m.name, whole(m).triangles.len())).collect();
     for (name, triangles) in expected {
         assert_eq!(counts[name], triangles, "{name}");
     }
@@ -142,6 +154,35 @@ fn teapot_is_a_closed_pot_with_two_tubes() {
     assert_eq!(unpaired_edges(&parts[0]), 40);
     assert_eq!(unpaired_edges(&parts[1]), 20);
     assert!(parts.iter().all(|p| p.signed_volume() > 0.0), "a tube faces inwards");
+}
+
+#[test]
+fn hand_placed_planes_cut_the_teapot() {
+    let planes = teapot_planes::file().planes;
+    assert_eq!(planes.len(), 11);
+    let mesh = whole(&teapot::model());
+    let crosses = |plane: &Rectangle, t: &[usize; 3]| {
+        let at = t.map(|v| coordinates(plane, mesh.positions[v]));
+        let inside = at.iter().all(|(a, b, _)| (0.0..1.0).contains(a) && (0.0..1.0).contains(b));
+        let (min, max) = at.iter().fold((f64::MAX, f64::MIN), |(l, h), c| (l.min(c.2), h.max(c.2)));
+        inside && min <= ROUNDING_M && max >= -ROUNDING_M
+    };
+    for plane in &planes {
+        let crossed = mesh.triangles.iter().filter(|t| crosses(plane, t)).count();
+        assert!(crossed >= 4, "{} crosses {crossed} triangles inside its rectangle", plane.name);
+    }
+}
+
+#[test]
+fn handle_planes_follow_each_other() {
+    let planes = teapot_planes::file().planes;
+    let handle: Vec<_> = planes.iter().filter(|p| p.name.starts_with("handle")).collect();
+    assert_eq!(handle.len(), 5);
+    for pair in handle.windows(2) {
+        // Both end at the same joint but for their margins of 1.5 mm.
+        let gap = (pair[0].origin + pair[0].u_axis).distance(pair[1].origin);
+        assert!(gap < 4e-3, "{} ends {gap} m from {}", pair[0].name, pair[1].name);
+    }
 }
 
 #[test]
@@ -174,9 +215,9 @@ fn aircraft_is_mirror_symmetric() {
 
 /// Every vertex of the mesh must have a mirror image in the plane, within a millimetre.
 fn assert_symmetric_about(plane: &Rectangle, points: &[DVec3]) {
-    let normal = plane.normal();
+    let normal = normal(plane);
     for &p in points {
-        let image = p - normal * 2.0 * plane.coordinates(p).2;
+        let image = p - normal * 2.0 * coordinates(plane, p).2;
         let gap = points.iter().map(|q| q.distance(image)).fold(f64::INFINITY, f64::min);
         assert!(gap < 1e-3, "{}: {p} has its nearest mirror image {gap} m off", plane.name);
     }
@@ -186,14 +227,14 @@ fn assert_symmetric_about(plane: &Rectangle, points: &[DVec3]) {
 fn fins_lie_in_the_published_planes() {
     let planes = aircraft::plane_file().planes;
     let published = DVec3::new(-0.917594, 0.0, 0.397518);
-    let normal = planes[1].normal();
+    let normal = normal(&planes[1]);
     assert!(normal.abs_diff_eq(aircraft::model_from_aircraft(published), 1e-6), "{normal}");
     let right = aircraft::right_fin();
     for (plane, fin) in [(&planes[1], right.clone()), (&planes[2], right.mirrored_x())] {
         let points = fin.mapped(aircraft::model_from_aircraft).positions;
         assert_symmetric_about(plane, &points);
         for &p in &points {
-            let (a, b, distance) = plane.coordinates(p);
+            let (a, b, distance) = coordinates(plane, p);
             assert!((0.0..1.0).contains(&a) && (0.0..1.0).contains(&b), "{}: {p} at ({a}, {b})", plane.name);
             assert!(distance.abs() <= 0.1001, "{}: {p} lies {distance} m off the plane", plane.name);
         }
@@ -204,7 +245,7 @@ fn fins_lie_in_the_published_planes() {
 fn horizontal_plane_holds_the_whole_plan_view() {
     let plane = &aircraft::plane_file().planes[0];
     let mesh = whole(&aircraft::model());
-    assert!(mesh.positions.iter().map(|&p| plane.coordinates(p)).all(|(a, b, _)| a.min(b) > 0.0 && a.max(b) < 1.0));
+    assert!(mesh.positions.iter().map(|&p| coordinates(plane, p)).all(|(a, b, _)| a.min(b) > 0.0 && a.max(b) < 1.0));
     // Of each side's pieces, wing and stabiliser are the two that reach farthest out.
     let reach = |m: &Mesh| m.triangles.iter().flatten().map(|&v| m.positions[v].x).fold(f64::NEG_INFINITY, f64::max);
     let mut pieces = components(&mesh);
@@ -236,7 +277,7 @@ fn assert_inside(plane: &Rectangle, corners: &[DVec3], margin_m: f64) {
     assert!(plane.u_axis.dot(plane.v_axis).abs() < ROUNDING_M, "{}: edges are not perpendicular", plane.name);
     let (slack_a, slack_b) = (margin_m / plane.u_axis.length(), margin_m / plane.v_axis.length());
     for &corner in corners {
-        let (a, b, distance) = plane.coordinates(corner);
+        let (a, b, distance) = coordinates(plane, corner);
         assert!(distance.abs() < ROUNDING_M, "{}: {corner} lies {distance} m off the plane", plane.name);
         let inside = (slack_a..=1.0 - slack_a).contains(&a) && (slack_b..=1.0 - slack_b).contains(&b);
         assert!(inside, "{}: {corner} at ({a}, {b})", plane.name);
@@ -287,7 +328,7 @@ fn planted_plates_keep_apart_and_differ_in_direction() {
                 .fold(f64::INFINITY, f64::min);
             let pair = format!("{} and {}", file.planes[i].name, file.planes[j].name);
             assert!((0.05..0.5).contains(&nearest), "{pair}: {nearest} m apart");
-            let cosine = file.planes[i].normal().dot(file.planes[j].normal()).abs();
+            let cosine = normal(&file.planes[i]).dot(normal(&file.planes[j])).abs();
             assert!(cosine < 0.9, "{pair} are nearly parallel: cosine {cosine}");
         }
     }
@@ -306,5 +347,7 @@ fn plane_files_parse_and_keep_their_numbers() {
             }
         }
     };
-    [analytic::plate_planes(), planted::plane_file(), aircraft::plane_file()].into_iter().for_each(check);
+    [analytic::plate_planes(), planted::plane_file(), aircraft::plane_file(), teapot_planes::file()]
+        .into_iter()
+        .for_each(check);
 }

@@ -8,6 +8,7 @@ pub mod mesh;
 pub mod planes;
 pub mod planted;
 pub mod teapot;
+pub mod teapot_planes;
 
 /// One generated file.
 pub struct GeneratedFile {
@@ -28,6 +29,7 @@ pub fn all_files() -> Vec<GeneratedFile> {
     add("box.glb", analytic::cuboid().to_glb());
     add("t_shape.glb", analytic::t_shape().to_glb());
     add("planted_planes.glb", planted::model().to_glb());
+    add("planes/teapot-by-hand.planes.json", teapot_planes::file().to_json());
     add("planes/aircraft-thesis.planes.json", aircraft::plane_file().to_json());
     add("planes/plate_over_ground.planes.json", analytic::plate_planes().to_json());
     add("planes/planted_planes.planes.json", planted::plane_file().to_json());

@@ -56,11 +56,6 @@ pub struct Model {
 }
 
 impl Model {
-    /// Number of triangles of all parts.
-    pub fn triangle_count(&self) -> usize {
-        self.parts.iter().map(|part| part.mesh.triangles.len()).sum()
-    }
-
     /// The file's bytes.
     pub fn to_glb(&self) -> Vec<u8> {
         let mut buffer = BufferBuilder::default();

@@ -34,18 +34,6 @@ impl Rectangle {
             v_axis: 2.0 * half_v,
         }
     }
-
-    /// Unit normal `u x v`.
-    pub fn normal(&self) -> DVec3 {
-        self.u_axis.cross(self.v_axis).normalize_or_zero()
-    }
-
-    /// Texture coordinates (a, b) of the point's foot on the plane, and its signed distance in metres.
-    pub fn coordinates(&self, p: DVec3) -> (f64, f64, f64) {
-        let d = p - self.origin;
-        let along = |axis: DVec3| d.dot(axis) / axis.length_squared();
-        (along(self.u_axis), along(self.v_axis), d.dot(self.normal()))
-    }
 }
 
 impl PlaneFile {

@@ -26,7 +26,7 @@ const CREASE_DEG: f64 = 65.0;
 type Profile = [[f64; 3]; 4];
 /// Profiles from the rim down the outside to the middle of the bottom, then from the knob's top to the lid's edge.
 const PROFILES: [Profile; 6] = [
-    [[1.4, 0.784, 2.4], [1.3375, 0.749, 2.53125], [1.4375, 0.805, 2.53125], [1.5, 0.84, 2.4]],
+    RIM,
     [[1.5, 0.84, 2.4], [1.75, 0.98, 1.875], [2.0, 1.12, 1.35], [2.0, 1.12, 0.9]],
     [[2.0, 1.12, 0.9], [2.0, 1.12, 0.45], [1.5, 0.84, 0.225], [1.5, 0.84, 0.15]],
     [[1.5, 0.84, 0.15], [1.5, 0.84, 0.075], [1.425, 0.798, 0.0], [0.0, 0.0, 0.0]],
@@ -35,6 +35,8 @@ const PROFILES: [Profile; 6] = [
 ];
 /// From the lid's edge to the rim.
 const SEAT: Profile = [[1.3, 0.728, 2.4], [1.3, 0.728, 2.4], [1.4, 0.784, 2.4], [1.4, 0.784, 2.4]];
+/// The pot's rim, from its inside over the top to its outside.
+pub const RIM: Profile = [[1.4, 0.784, 2.4], [1.3375, 0.749, 2.53125], [1.4375, 0.805, 2.53125], [1.5, 0.84, 2.4]];
 /// The lid's knob.
 pub const KNOB: Profile = [[0.0, 0.0, 3.15], [0.8, 0.45, 3.15], [0.0, 0.0, 2.85], [0.2, 0.112, 2.7]];
 
