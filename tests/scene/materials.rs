@@ -105,10 +105,12 @@ fn blend_is_opaque_and_counted() {
     assert_eq!((scene.soup.cutout[0], scene.materials[1].alpha_cutoff), (None, None));
 }
 
+/// Name, change of the file, exit code where the material is a cut-out.
+type BadImage = (&'static str, fn(&mut Model), u8);
+
 #[test]
 fn images_that_cannot_be_had() {
-    // name, change of the file, exit code as a cut-out
-    let cases: [(&str, fn(&mut Model), u8); 7] = [
+    let cases: [BadImage; 7] = [
         ("missing file", |m| m.json["images"][0] = json!({"uri": "nothing.png"}), 3),
         ("damaged", |m| m.json["images"][0]["bufferView"] = json!(0), 3),
         ("no source", |m| m.json["images"][0] = json!({}), 3),
