@@ -1,9 +1,42 @@
 //! glTF -> [`Scene`]: the triangles of a file in model space, with what the renderer needs to draw them.
+//!
+//! In: a `.glb` or `.gltf` file with the buffers and images beside it. Out: every triangle of the default scene
+//! in its static pose, transforms composed in f64, in the order of the file (nodes depth first), and a list of
+//! everything that was left out. Source: the glTF 2.0 specification (Khronos, ISO/IEC 12113:2022).
+//!
+//! Guaranteed for any input: no panic, no endless loop, no byte read outside the file's own buffers, no file
+//! opened outside the model's folder, and memory bounded by [`MAX_TRIANGLES`], [`MAX_TEXELS`] and the files'
+//! sizes. Not guaranteed: that a file with rules broken which concern no triangle (animations, cameras, unused
+//! records) is refused; it is read.
+//!
+//! ```no_run
+//! let scene = shadowfit::scene::load(std::path::Path::new("teapot.glb"))?;
+//! println!("{} triangles", scene.soup.corners_model.len());
+//! # Ok::<(), shadowfit::scene::SceneError>(())
+//! ```
+
+mod accessor;
+mod assembly;
+mod document;
+mod extensions;
+mod files;
+mod materials;
+mod nodes;
+mod primitive;
+
+pub use assembly::{MAX_DRAWS, MAX_TRIANGLES};
+pub use materials::{MAX_IMAGE_TEXELS, MAX_TEXELS};
+pub use primitive::MAX_COORDINATE;
 
 use glam::{Vec2, Vec3};
 use serde::Serialize;
 use shadowfit_solver::mesh::Soup;
-use std::sync::Arc;
+use std::{
+    collections::HashMap,
+    io,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 /// How a surface looks; only what Lambert shading needs.
 #[derive(Clone, Debug)]
@@ -40,10 +73,160 @@ pub struct Scene {
     pub uvs: Vec<[Vec2; 3]>,
     /// Index into `materials`.
     pub material_of: Vec<u32>,
-    /// Materials; index 0 is always there.
+    /// Materials; index 0 is always there: glTF's default material. Material `i` of the file is `i + 1`.
     pub materials: Vec<Material>,
     /// Decoded base colour images, sRGB.
     pub images: Vec<Arc<image::RgbaImage>>,
     /// All that was left out, counted.
     pub skipped: Vec<Skipped>,
+}
+
+/// Why a file is not a scene.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The model file itself cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Io {
+        /// The model file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The file, or one that it needs, breaks the rules of glTF or a limit of this reader.
+    #[error(
+        "{}: invalid glTF{}: {reason}; export the model again, or see what `npx gltf-validator` says",
+        path.display(),
+        at(pointer)
+    )]
+    Invalid {
+        /// The model file.
+        path: PathBuf,
+        /// JSON pointer (RFC 6901) of the culprit; empty where it is the whole file.
+        pointer: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The file is well, but needs a feature that this reader does not have.
+    #[error("{}: needs {}, not supported: {remedy}", path.display(), features.join(", "))]
+    Unsupported {
+        /// The model file.
+        path: PathBuf,
+        /// Names of the extensions or formats.
+        features: Vec<String>,
+        /// How to get rid of them.
+        remedy: String,
+    },
+}
+
+impl SceneError {
+    /// The process exit code: 2 the file cannot be read, 3 invalid input, 5 an unsupported feature.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Io { .. } => 2,
+            Self::Invalid { .. } => 3,
+            Self::Unsupported { .. } => 5,
+        }
+    }
+}
+
+fn at(pointer: &str) -> String {
+    if pointer.is_empty() { String::new() } else { format!(" at {pointer}") }
+}
+
+/// Reads a `.glb` or `.gltf` file. What it is decides its content, not its name.
+///
+/// # Errors
+/// A file that cannot be read, that is invalid (no triangles counts as invalid), or that needs an unsupported
+/// feature.
+pub fn load(path: &Path) -> Result<Scene, SceneError> {
+    let model = files::ModelFile::open(path)?;
+    read(&model).map_err(|fault| fault.at(path))
+}
+
+/// The recipe of [`load`].
+fn read(model: &files::ModelFile) -> Result<Scene, Fault> {
+    let document = document::Document::parse(model.json())?;
+    let mut notices = Notices::default();
+    extensions::check(&document, &mut notices)?;
+    let hierarchy = nodes::Hierarchy::new(&document)?;
+    let buffers = files::Buffers::load(model, &document)?;
+    let data = accessor::Data { document: &document, buffers: &buffers };
+    let mut scene = assembly::assemble(model, &data, &hierarchy, &mut notices)?;
+    scene.skipped = notices.list;
+    Ok(scene)
+}
+
+/// The external buffers and images that a file names: relative paths with `/` between the parts,
+/// percent-decoded, in the order of the file, each once. Whether they exist is not checked.
+///
+/// # Errors
+/// A file that cannot be read or parsed, or a URI that leads out of the model's folder.
+pub fn external_files(path: &Path) -> Result<Vec<String>, SceneError> {
+    let model = files::ModelFile::open(path)?;
+    let paths = document::Document::parse(model.json()).and_then(|document| files::external_paths(&document));
+    paths.map_err(|fault| fault.at(path))
+}
+
+/// An error that does not know its file yet.
+#[derive(Clone, Debug)]
+enum Fault {
+    Invalid { pointer: String, reason: String },
+    Unsupported { features: Vec<String>, remedy: String },
+}
+
+impl Fault {
+    fn new(pointer: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self::Invalid { pointer: pointer.into(), reason: reason.into() }
+    }
+
+    /// The reference at `pointer` to element `index` of a top-level list that has only `length`.
+    fn index(pointer: &str, index: usize, list: &str, length: usize) -> Self {
+        Self::new(pointer, format!("{index}, but /{list} has {length} elements"))
+    }
+
+    /// Extensions that `gltf-transform` removes.
+    fn unsupported(names: &[&str]) -> Self {
+        let features = names.iter().map(|name| (*name).to_owned()).collect();
+        Self::Unsupported { features, remedy: "remove it with `npx @gltf-transform/cli copy IN OUT`".to_owned() }
+    }
+
+    fn at(self, path: &Path) -> SceneError {
+        let path = path.to_owned();
+        match self {
+            Self::Invalid { pointer, reason } => SceneError::Invalid { path, pointer, reason },
+            Self::Unsupported { features, remedy } => SceneError::Unsupported { path, features, remedy },
+        }
+    }
+}
+
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Invalid { pointer, reason } => write!(f, "{pointer}: {reason}"),
+            Self::Unsupported { features, remedy } => write!(f, "needs {}: {remedy}", features.join(", ")),
+        }
+    }
+}
+
+/// Collects [`Skipped`]: one entry a kind, in the order of first appearance.
+#[derive(Default)]
+struct Notices {
+    list: Vec<Skipped>,
+    index_of: HashMap<String, usize>,
+}
+
+impl Notices {
+    /// Counts `count` more of `what`; the first `why` stays.
+    fn add(&mut self, what: &str, count: usize, why: &str) {
+        if count == 0 {
+            return;
+        }
+        if let Some(&index) = self.index_of.get(what) {
+            self.list[index].count += count;
+        } else {
+            self.index_of.insert(what.to_owned(), self.list.len());
+            self.list.push(Skipped { what: what.to_owned(), count, why: why.to_owned() });
+        }
+    }
 }
