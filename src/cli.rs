@@ -120,7 +120,9 @@ pub enum CliError {
     #[error(transparent)]
     Fit(#[from] FitError),
     /// The result is written, but not as good as asked for.
-    #[error("shadow_error {found:.4} is above --max-error {wanted}: allow more planes or texels (--max-planes, --texture-size, --preset best)")]
+    #[error(
+        "shadow_error {found:.4} is above --max-error {wanted}: allow more planes or texels (--max-planes, --texture-size, --preset best)"
+    )]
     Target {
         /// Held-out error reached.
         found: f64,

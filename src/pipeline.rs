@@ -67,8 +67,14 @@ const TARGET_MIN_GAIN: f64 = 5e-4;
 /// Most planes where `--max-error` is given without `--max-planes`.
 const TARGET_MAX_PLANES: usize = 64;
 
-/// Purposes of the seeds, so that no two samplings share their points.
-const [SEED_TRAINING, SEED_HELD_OUT, SEED_JUDGING, SEED_IMAGE]: [u64; 4] = [1, 2, 3, 4];
+/// What a sampling is for: no two share their points.
+#[derive(Clone, Copy)]
+enum Purpose {
+    Training = 1,
+    HeldOut,
+    Judging,
+    Image,
+}
 
 impl Effort {
     /// A first look: about five seconds for a model of some thousand triangles on two cores.
@@ -230,9 +236,9 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
 
     progress("tracing the reference".to_string());
     let effort = &request.effort;
-    let receivers = sample(&mesh, &receiver_options(effort.receivers, EXPOSURE_RAYS[0], request, SEED_TRAINING));
+    let receivers = sample(&mesh, &receiver_options(effort.receivers, EXPOSURE_RAYS[0], request, Purpose::Training));
     time_s.receivers = clock.lap();
-    let lights = request.domain.directions(effort.lights, hash(request.seed, SEED_TRAINING));
+    let lights = request.domain.directions(effort.lights, seed_for(request, Purpose::Training));
     let pairs = trace(&mesh, &receivers, &lights, request.domain.solid_angle());
     time_s.reference = clock.lap();
 
@@ -241,14 +247,20 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
     progress("writing the asset".to_string());
     let stem = stem_of(&request.model);
     let (out_dir, bounds) = (request.out_dir.as_path(), receiver_bounds(&mesh, &receivers));
-    let asset_request =
-        AssetRequest { input: &request.model, out_dir, stem: &stem, frame: &mesh.frame, bounds, planes: &fitted.planes };
+    let asset_request = AssetRequest {
+        input: &request.model,
+        out_dir,
+        stem: &stem,
+        frame: &mesh.frame,
+        bounds,
+        planes: &fitted.planes,
+    };
     let written = asset::write(&asset_request)?;
     time_s.write = clock.lap();
 
     progress("validating what was written".to_string());
     let planes = asset::read(&written.model)?.in_unit_space(&mesh.frame);
-    let held_out_pairs = held_out(&mesh, request, HELD_OUT, SEED_HELD_OUT);
+    let held_out_pairs = held_out(&mesh, request, HELD_OUT, Purpose::HeldOut);
     let held_out = measure(&planes, &held_out_pairs);
     let (image, picture) = match &request.validation {
         Some(options) => {
@@ -314,13 +326,15 @@ fn fit(
     let selection = selection_options(request);
     let candidates = generate(mesh, &CandidateOptions { seed: request.seed, ..request.effort.candidates });
     let sample = thinned(pairs, request.effort.search_blocked, request.effort.search_lit);
-    let judging = request.max_error.map(|target| (target, held_out(mesh, request, JUDGING, SEED_JUDGING)));
+    let judging = request.max_error.map(|target| (target, held_out(mesh, request, JUDGING, Purpose::Judging)));
     let (start, mut found_at_s) = (Instant::now(), Vec::new());
     let selected = select(mesh, &sample, &candidates, &selection, &mut |planes| {
         progress(format!("searching: {} planes", planes.len()));
         found_at_s.push(start.elapsed().as_secs_f64());
         match &judging {
-            Some((target, judging)) if measure(&bake(pairs, planes, &options), judging).shadow_error <= target * TARGET_MARGIN => {
+            Some((target, judging))
+                if measure(&bake(pairs, planes, &options), judging).shadow_error <= target * TARGET_MARGIN =>
+            {
                 Verdict::Enough
             }
             _ => Verdict::Continue,
@@ -345,20 +359,24 @@ fn selection_options(request: &FitRequest) -> SelectionOptions {
     options
 }
 
-fn receiver_options(count: usize, exposure_rays: usize, request: &FitRequest, purpose: u64) -> ReceiverOptions {
-    ReceiverOptions { count, exposure_rays, seed: hash(request.seed, purpose) }
+fn seed_for(request: &FitRequest, purpose: Purpose) -> u64 {
+    hash(request.seed, purpose as u64)
+}
+
+fn receiver_options(count: usize, exposure_rays: usize, request: &FitRequest, purpose: Purpose) -> ReceiverOptions {
+    ReceiverOptions { count, exposure_rays, seed: seed_for(request, purpose) }
 }
 
 /// Pairs that the search does not see.
-fn held_out(mesh: &Mesh, request: &FitRequest, [receivers, lights]: [usize; 2], purpose: u64) -> Pairs {
+fn held_out(mesh: &Mesh, request: &FitRequest, [receivers, lights]: [usize; 2], purpose: Purpose) -> Pairs {
     let receivers = sample(mesh, &receiver_options(receivers, EXPOSURE_RAYS[1], request, purpose));
-    let lights = request.domain.directions(lights, hash(request.seed, purpose));
+    let lights = request.domain.directions(lights, seed_for(request, purpose));
     trace(mesh, &receivers, &lights, request.domain.solid_angle())
 }
 
 /// The worst held-out light first, then others that neither search nor metrics used.
 fn validation_lights(request: &FitRequest, held_out: &Metrics, count: usize) -> Vec<Vec3> {
-    let others = request.domain.directions(count, hash(request.seed, SEED_IMAGE));
+    let others = request.domain.directions(count, seed_for(request, Purpose::Image));
     let worst = Vec3::from_array(held_out.worst_light.direction);
     let worst = (held_out.worst_light.max > 0.0).then_some(worst);
     worst.into_iter().chain(others).take(count).collect()

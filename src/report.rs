@@ -131,7 +131,10 @@ impl fmt::Display for Report {
             Some(image) => {
                 let flip = image.flip_mean.map_or(String::new(), |flip| format!(", FLIP {flip:.4}"));
                 let views = format!("{} frames of {} px", image.frames, image.size_px);
-                line("image error", format!("{:.4} of covered pixels{flip} ({views}, {})", image.mask_error, image.renderer))?;
+                line(
+                    "image error",
+                    format!("{:.4} of covered pixels{flip} ({views}, {})", image.mask_error, image.renderer),
+                )?;
             }
         }
         line("texture", format!("{:.1} KiB", self.texture_bytes as f64 / 1024.0))?;

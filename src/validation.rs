@@ -165,7 +165,8 @@ pub fn validate(
         let primary = Primary::trace(mesh, &camera, size_px, Antialias::Off)?;
         for (index, &to_light) in lights.iter().enumerate() {
             let light = Light::Directional { to_light };
-            let visibility = |hit: &PrimaryHit| f32::from(!mesh.is_blocked(ray_origin(hit.p_unit, hit.normal), to_light));
+            let visibility =
+                |hit: &PrimaryHit| f32::from(!mesh.is_blocked(ray_origin(hit.p_unit, hit.normal), to_light));
             let mut draw = |mode| {
                 let options = FrameOptions { size_px, mode, antialias: Antialias::Off };
                 renderer.render(&FrameRequest { camera, light, options })
@@ -210,7 +211,9 @@ fn compare(traced: &RgbaImage, drawn: &RgbaImage) -> PixelErrors {
     };
     let rows = traced.as_raw().par_chunks(4096).zip(drawn.as_raw().par_chunks(4096));
     let sums: Vec<PixelErrors> = rows
-        .map(|(t, d)| t.chunks_exact(4).zip(d.chunks_exact(4)).map(pixel).fold(PixelErrors::default(), PixelErrors::add))
+        .map(|(t, d)| {
+            t.chunks_exact(4).zip(d.chunks_exact(4)).map(pixel).fold(PixelErrors::default(), PixelErrors::add)
+        })
         .collect();
     sums.into_iter().fold(PixelErrors::default(), PixelErrors::add)
 }
