@@ -108,6 +108,7 @@ impl Effort {
                 screening_pairs: 20_000,
                 finalists: 48,
                 refined: 4,
+                polished: 2,
                 refine_steps: 5,
                 replace_rounds: 1,
             },
