@@ -21,7 +21,7 @@ use shadowfit_solver::{
     selection::{SelectionOptions, Verdict, select},
     shade::plane_rows,
     visibility::{Pairs, trace},
-    votes::{Mask, thinned},
+    votes::Mask,
 };
 use std::{
     io::Cursor,
@@ -36,10 +36,6 @@ pub struct Effort {
     pub receivers: usize,
     /// Light directions that decide planes and textures; memory is about 9 bytes x receivers x lights.
     pub lights: usize,
-    /// Blocked pairs that the search uses at most; the textures are decided by all of them.
-    pub search_blocked: usize,
-    /// Lit pairs that the search uses at most.
-    pub search_lit: usize,
     /// Where the search starts.
     pub candidates: CandidateOptions,
     /// How it goes on.
@@ -84,9 +80,14 @@ impl Effort {
         Self {
             receivers: 24_576,
             lights: 160,
-            search_blocked: 60_000,
-            search_lit: 120_000,
-            selection: SelectionOptions { texels: 64, finalists: 24, refined: 3, replace_rounds: 0, ..base.selection },
+            selection: SelectionOptions {
+                texels: 64,
+                scoring_pairs: [60_000, 120_000],
+                finalists: 24,
+                refined: 3,
+                replace_rounds: 0,
+                ..base.selection
+            },
             texture_size: 128,
             ..base
         }
@@ -98,12 +99,11 @@ impl Effort {
         Self {
             receivers: 65_536,
             lights: 256,
-            search_blocked: 150_000,
-            search_lit: 250_000,
             candidates: CandidateOptions { directions: 150, offsets: 12, surface_points: 400, seed: 0 },
             selection: SelectionOptions {
                 max_planes: 12,
                 min_gain: 0.005,
+                scoring_pairs: [150_000, 250_000],
                 texels: 96,
                 screening_pairs: 20_000,
                 finalists: 48,
@@ -123,10 +123,14 @@ impl Effort {
         Self {
             receivers: 98_304,
             lights: 384,
-            search_blocked: 400_000,
-            search_lit: 600_000,
             candidates: CandidateOptions { directions: 300, offsets: 20, surface_points: 1000, ..base.candidates },
-            selection: SelectionOptions { refined: 8, refine_steps: 6, replace_rounds: 4, ..base.selection },
+            selection: SelectionOptions {
+                scoring_pairs: [400_000, 600_000],
+                refined: 8,
+                refine_steps: 6,
+                replace_rounds: 4,
+                ..base.selection
+            },
             ..base
         }
     }
@@ -326,10 +330,9 @@ fn fit(
     }
     let selection = selection_options(request);
     let candidates = generate(mesh, &CandidateOptions { seed: request.seed, ..request.effort.candidates });
-    let sample = thinned(pairs, request.effort.search_blocked, request.effort.search_lit);
     let judging = request.max_error.map(|target| (target, held_out(mesh, request, JUDGING, Purpose::Judging)));
     let (start, mut found_at_s) = (Instant::now(), Vec::new());
-    let selected = select(mesh, &sample, &candidates, &selection, &mut |planes| {
+    let selected = select(mesh, pairs, &candidates, &selection, &mut |planes| {
         progress(format!("searching: {} planes", planes.len()));
         found_at_s.push(start.elapsed().as_secs_f64());
         match &judging {

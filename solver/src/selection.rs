@@ -27,6 +27,8 @@ pub struct SelectionOptions {
     /// A plane must lower `shadow_error` by at least this. 0.02 and up leaves visible shadows out; below 0.002 the
     /// search picks noise.
     pub min_gain: f64,
+    /// Blocked pairs that planes are scored on, and lit ones. All pairs where fewer are left.
+    pub scoring_pairs: [usize; 2],
     /// Texels a side of the textures that the search itself uses. 32 to 128; the cost does not depend on it, but
     /// with few pairs per texel gains get noisy.
     pub texels: usize,
@@ -217,8 +219,10 @@ impl Search<'_> {
     /// The best plane for pairs that nothing covers. `bounds` holds each candidate's last screening gain (a lazy
     /// upper bound); `start` is one more rectangle to improve.
     fn best_plane(&self, open: &Pairs, bounds: &mut [f64], start: Option<&ShadowPlane>) -> Option<(f64, Mask)> {
-        let sample = thinned(open, self.options.screening_pairs, 2 * self.options.screening_pairs);
-        let screened = self.screen(&sample, bounds);
+        let [blocked, lit] = self.options.scoring_pairs;
+        let open = &thinned(open, blocked, lit);
+        let screened =
+            self.screen(&thinned(open, self.options.screening_pairs, 2 * self.options.screening_pairs), bounds);
         // Score the finalists on all pairs; refine the best, first as unbounded planes, then as rectangles.
         let wide = |i: &usize| {
             let candidate = &self.candidates[*i];
