@@ -5,9 +5,9 @@
 //! and those of the nodes above it are applied, so that a tool may move the whole model.
 
 use super::{
-    AssetError, Bounds, Channel, EXTENSION, Encoding, ModelPlane, Rectangle, ShadowSet, atlas, files, glb, pointer::At,
-    uri,
+    AssetError, Bounds, Channel, EXTENSION, Encoding, ModelPlane, Rectangle, ShadowSet, atlas, files, pointer::At,
 };
+use crate::gltf_file::{GltfFile, UriError};
 use glam::{DMat4, DQuat, DVec3};
 use image::{ImageFormat, ImageReader, RgbImage};
 use serde::Deserialize;
@@ -22,18 +22,10 @@ use std::{collections::BTreeMap, io::Cursor, path::Path};
 /// wrong, with its JSON pointer.
 pub fn read(path: &Path) -> Result<ShadowSet, AssetError> {
     let bytes = files::read(path)?;
-    let malformed = |why: String| AssetError::Malformed { path: path.into(), why };
-    let (json, bin) = if bytes.starts_with(glb::MAGIC) {
-        let chunks = glb::split(&bytes).map_err(malformed)?;
-        (chunks.json, chunks.bin)
-    } else {
-        let text = std::str::from_utf8(&bytes).map_err(|e| malformed(format!("neither GLB nor UTF-8 text: {e}")))?;
-        (text.trim_start_matches('\u{feff}'), None)
-    };
-    let value: Value = serde_json::from_str(json).map_err(|e| malformed(format!("not JSON: {e}")))?;
-    let root = At::root(path, &value);
-    let mut atlases = Atlases { path, root: root.clone(), bin, decoded: BTreeMap::new() };
-    if value.get("asset").is_none() {
+    let file = GltfFile::new(path, &bytes).map_err(|fault| AssetError::invalid(path, fault))?;
+    let root = At::root(path, file.root());
+    let mut atlases = Atlases { file: &file, root: root.clone(), decoded: BTreeMap::new() };
+    if root.optional("asset").is_none() {
         // The sidecar is already in model space.
         let sets = root.member("sets")?;
         return match sets.elements()?.as_slice() {
@@ -41,6 +33,7 @@ pub fn read(path: &Path) -> Result<ShadowSet, AssetError> {
             others => Err(sets.error(format!("one set expected, found {}", others.len()))),
         };
     }
+    file.check_version().map_err(|fault| AssetError::invalid(path, fault))?;
     let (index, model_from_frame) = frame_node(&root)?;
     let sets = root.member("extensions")?.member(EXTENSION)?.member("sets")?.elements()?;
     let mut set = read_set(&index.follow(&sets)?, &mut atlases)?;
@@ -104,9 +97,8 @@ fn crop(atlas: &RgbImage, region: &At<'_>, channel: Channel) -> Result<OccluderT
 
 /// Pictures of a document, decoded once each.
 struct Atlases<'a> {
-    path: &'a Path,
+    file: &'a GltfFile<'a>,
     root: At<'a>,
-    bin: Option<&'a [u8]>,
     decoded: BTreeMap<String, RgbImage>,
 }
 
@@ -137,7 +129,7 @@ impl Atlases<'_> {
         let offset: usize = view.optional("byteOffset").map_or(Ok(0), |offset| offset.parse())?;
         let length: usize = view.member("byteLength")?.parse()?;
         let loaded;
-        let bytes = match (buffer.optional("uri"), self.bin) {
+        let bytes = match (buffer.optional("uri"), self.file.chunks().bin) {
             (Some(uri), _) => {
                 loaded = self.uri_bytes(&uri)?;
                 loaded.as_slice()
@@ -153,11 +145,10 @@ impl Atlases<'_> {
     /// Contents of a `data:` URI or of a file below the document's folder.
     fn uri_bytes(&self, at: &At<'_>) -> Result<Vec<u8>, AssetError> {
         let uri: String = at.parse()?;
-        if uri::is_data(&uri) {
-            return uri::data(&uri).ok_or_else(|| at.error("not base64".into()));
-        }
-        let file = files::locate(self.path, &uri).map_err(|why| at.error(why))?;
-        files::read(&file.source)
+        self.file.fetch(&uri).map_err(|error| match error {
+            UriError::Unreadable { file, source } => AssetError::Io { action: "read", path: file.path, source },
+            UriError::Forbidden(why) | UriError::Damaged(why) => at.error(why),
+        })
     }
 }
 
@@ -273,11 +264,11 @@ struct PlaneFileEntry {
 /// The file cannot be read; an unknown member; axes that are parallel.
 pub fn read_plane_file(path: &Path) -> Result<Vec<ModelRectangle>, AssetError> {
     let bytes = files::read(path)?;
-    let malformed = |e: serde_json::Error| AssetError::Malformed { path: path.into(), why: format!("not JSON: {e}") };
-    let root: Value = serde_json::from_slice(&bytes).map_err(malformed)?;
+    let file = GltfFile::new(path, &bytes).map_err(|fault| AssetError::invalid(path, fault))?;
+    let root = At::root(path, file.root());
     // The outer object is checked for unknown members; the planes one by one, so that each is named.
-    let _: PlaneFile = At::root(path, &root).parse()?;
-    let list = At::root(path, &root).member("planes")?.elements()?;
+    let _: PlaneFile = root.parse()?;
+    let list = root.member("planes")?.elements()?;
     let mut rectangles = Vec::with_capacity(list.len());
     for at in list {
         let PlaneFileEntry { name, origin, u_axis, v_axis, side } = at.parse()?;

@@ -10,9 +10,9 @@
 
 use super::{
     Fault,
+    buffers::Buffers,
     document::{self, Document},
     extensions,
-    files::Buffers,
 };
 
 /// A document with its buffers.

@@ -11,11 +11,11 @@ use super::{
     Fault, Notices, Scene,
     accessor::{Accessor, Data, Use},
     document::{Instancing, Node, record},
-    files::ModelFile,
     materials::Surfaces,
     nodes::{Hierarchy, placement},
     primitive::{Pose, Primitive, Transform},
 };
+use crate::gltf_file::GltfFile;
 use glam::{DAffine3, DMat3, DVec3};
 use std::collections::HashMap;
 
@@ -50,12 +50,12 @@ struct Copies<'a> {
 /// # Errors
 /// Whatever is wrong with a record that the scene uses, no triangles, or more than the limits.
 pub(super) fn assemble(
-    model: &ModelFile,
+    file: &GltfFile<'_>,
     data: &Data<'_>,
     hierarchy: &Hierarchy,
     notices: &mut Notices,
 ) -> Result<Scene, Fault> {
-    let mut surfaces = Surfaces::new(model, data);
+    let mut surfaces = Surfaces::new(file, data);
     let mut meshes: Vec<Option<Vec<Primitive<'_>>>> = Vec::new();
     meshes.resize_with(data.document.meshes.len(), || None);
     // First round: open and count.

@@ -1,6 +1,6 @@
 //! The JSON of a glTF file, as typed records.
 //!
-//! In: the JSON text. Out: a [`Document`], where every index and number is still unchecked against the rest of
+//! In: the JSON. Out: a [`Document`], where every index and number is still unchecked against the rest of
 //! the file: the stages that use it check it and answer with its JSON pointer.
 //!
 //! Not the records of the `gltf` crate: they cut indices to 32 bits without a word, refuse a scene without
@@ -240,35 +240,27 @@ pub(super) struct Skin {
 }
 
 impl Document {
-    /// Parses the JSON text of a glTF file.
+    /// Takes the records out of the JSON of a glTF file.
     ///
     /// # Errors
-    /// Text that is not UTF-8 or not JSON, another version than 2.x, or a record of the wrong shape.
-    pub(super) fn parse(text: &[u8]) -> Result<Self, Fault> {
-        let text = std::str::from_utf8(text)
-            .map_err(|error| Fault::new("", format!("the JSON is not UTF-8 after byte {}", error.valid_up_to())))?;
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let root: Value = serde_json::from_str(text).map_err(|error| Fault::new("", format!("not JSON: {error}")))?;
-        if !root.is_object() {
-            return Err(Fault::new("", "the JSON is not an object"));
-        }
-        check_version(&root)?;
+    /// A record of the wrong shape.
+    pub(super) fn parse(root: &Value) -> Result<Self, Fault> {
         Ok(Self {
-            accessors: list(&root, "accessors")?,
-            buffer_views: list(&root, "bufferViews")?,
-            buffers: list(&root, "buffers")?,
-            images: list(&root, "images")?,
-            materials: list(&root, "materials")?,
-            meshes: list(&root, "meshes")?,
-            nodes: list(&root, "nodes")?,
-            samplers: list(&root, "samplers")?,
-            scenes: list(&root, "scenes")?,
+            accessors: list(root, "accessors")?,
+            buffer_views: list(root, "bufferViews")?,
+            buffers: list(root, "buffers")?,
+            images: list(root, "images")?,
+            materials: list(root, "materials")?,
+            meshes: list(root, "meshes")?,
+            nodes: list(root, "nodes")?,
+            samplers: list(root, "samplers")?,
+            scenes: list(root, "scenes")?,
             scene: root.get("scene").map(|value| record(value, "/scene")).transpose()?,
-            skins: list(&root, "skins")?,
-            textures: list(&root, "textures")?,
+            skins: list(root, "skins")?,
+            textures: list(root, "textures")?,
             animations: root.get("animations").and_then(Value::as_array).map_or(0, Vec::len),
-            extensions_used: list(&root, "extensionsUsed")?,
-            extensions_required: list(&root, "extensionsRequired")?,
+            extensions_used: list(root, "extensionsUsed")?,
+            extensions_required: list(root, "extensionsRequired")?,
         })
     }
 }
@@ -297,22 +289,5 @@ fn list<T: DeserializeOwned>(root: &Value, key: &str) -> Result<Vec<T>, Fault> {
             values.iter().enumerate().map(|(i, value)| record(value, &format!("/{key}/{i}"))).collect()
         }
         Some(_) => Err(Fault::new(format!("/{key}"), "not a list")),
-    }
-}
-
-/// `asset.version` must be 2.x, and `asset.minVersion`, where it is given, 2.0.
-fn check_version(root: &Value) -> Result<(), Fault> {
-    let of = |key: &str| root.get("asset").and_then(|asset| asset.get(key)).and_then(Value::as_str);
-    match of("version") {
-        Some(version) if version.starts_with("2.") => {}
-        Some(version) => {
-            let remedy = "convert it with `npx gltf-pipeline -i IN -o OUT`";
-            return Err(Fault::new("/asset/version", format!("glTF {version:?}, but 2.x is read: {remedy}")));
-        }
-        None => return Err(Fault::new("/asset/version", "missing: this is not a glTF 2.0 file")),
-    }
-    match of("minVersion") {
-        None | Some("2.0") => Ok(()),
-        Some(version) => Err(Fault::new("/asset/minVersion", format!("needs a reader of glTF {version:?}, not 2.0"))),
     }
 }

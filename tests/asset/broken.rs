@@ -92,7 +92,8 @@ fn broken_sidecars_name_the_place() {
     let json = std::fs::read_to_string(&written.sidecar).unwrap();
     let cases = [
         ("/sets/0/planes/2/occluderTexture/uri", json!("../m.atlas-0.png"), "/sets/0/planes/2/occluderTexture/uri"),
-        ("/sets/0/planes/2/occluderTexture/uri", json!("data:,x"), "not base64"),
+        ("/sets/0/planes/2/occluderTexture/uri", json!("data:,x"), "cannot decode the texture"),
+        ("/sets/0/planes/2/occluderTexture/uri", json!("data:;base64,@"), "base64"),
         ("/sets/0/planes/0/side", json!("up"), "/sets/0/planes/0/side"),
         ("/sets", json!([]), "/sets: one set expected, found 0"),
     ];
