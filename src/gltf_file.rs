@@ -70,8 +70,9 @@ impl<'a> GltfFile<'a> {
         let mut chunks = if is_glb {
             container::split(bytes).map_err(|reason| invalid(format!("GLB: {reason}")))?
         } else {
-            let json = std::str::from_utf8(bytes);
-            let json = json.map_err(|error| invalid(format!("neither GLB nor UTF-8 text: {error}")))?;
+            let json = std::str::from_utf8(bytes).map_err(|error| {
+                invalid(format!("neither GLB nor UTF-8 text: the file does not start with `glTF`, and has an {error}"))
+            })?;
             Chunks { json, bin: None, others: Vec::new() }
         };
         chunks.json = chunks.json.strip_prefix('\u{feff}').unwrap_or(chunks.json);

@@ -16,6 +16,7 @@ use crate::gltf_file::{
     container::{self, Chunks},
     uri,
 };
+use gltf::json::texture::{MagFilter, MinFilter, WrappingMode};
 use serde_json::{Value, json};
 use shadowfit_solver::{
     mesh::Frame,
@@ -418,8 +419,9 @@ impl<'a> Document<'a> {
 
     /// Sampler, images, textures, and for pictures inside the file buffer views and the buffer's new length.
     fn add_textures(&mut self, pictures: &Pictures<'_>) -> Result<(), Invalid> {
-        // 9729 LINEAR, 33071 CLAMP_TO_EDGE.
-        let sampler = json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 });
+        let clamp = WrappingMode::ClampToEdge;
+        let sampler =
+            json!({ "magFilter": MagFilter::Linear, "minFilter": MinFilter::Linear, "wrapS": clamp, "wrapT": clamp });
         let sampler = self.append("samplers", &[sampler])?;
         let names = pictures.pictures.iter();
         let images: Vec<Value> = match &pictures.offsets {

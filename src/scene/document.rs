@@ -3,14 +3,60 @@
 //! In: the JSON. Out: a [`Document`], where every index and number is still unchecked against the rest of
 //! the file: the stages that use it check it and answer with its JSON pointer.
 //!
-//! Not the records of the `gltf` crate: they cut indices to 32 bits without a word, refuse a scene without
-//! `nodes` (which is legal), round node transforms to f32 and report errors without a JSON pointer. The tests use
-//! that crate as the second opinion.
+//! The enumerations (component types, modes, ..) are those of the `gltf` crate, the records are not: it cuts
+//! indices to 32 bits without a word, refuses a scene without `nodes` (which is legal), rounds node transforms to
+//! f32, reports errors without a JSON pointer. The tests use its readers as
+//! the second opinion.
 
 use super::Fault;
-use serde::{Deserialize, de::DeserializeOwned};
+use gltf::json::{
+    accessor::{GenericComponentType, IndexComponentType, Type},
+    material::AlphaMode,
+    mesh::Mode,
+    texture::WrappingMode,
+    validation::Checked,
+};
+use serde::{
+    Deserialize, Deserializer,
+    de::{DeserializeOwned, Error as _},
+};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
+
+/// A value of an enumeration. One that glTF 2.0 does not have is an error only where it is used.
+#[derive(Clone, Debug)]
+pub(super) struct Listed<T>(Result<T, Value>);
+
+impl<T: Copy> Listed<T> {
+    /// The value, if glTF 2.0 has it.
+    pub(super) fn known(&self) -> Option<T> {
+        self.0.as_ref().ok().copied()
+    }
+
+    /// The value, which stands at `pointer`.
+    ///
+    /// # Errors
+    /// glTF 2.0 does not have it.
+    pub(super) fn get(&self, pointer: &str) -> Result<T, Fault> {
+        let unknown = |value: &Value| Fault::new(pointer, format!("{value}, but glTF 2.0 has no such value"));
+        self.0.as_ref().copied().map_err(unknown)
+    }
+}
+
+impl<'de, T> Deserialize<'de> for Listed<T>
+where
+    Checked<T>: DeserializeOwned,
+{
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = Value::deserialize(deserializer)?;
+        // The crate looks at the lower 32 bits only.
+        let is_whole = value.as_u64().is_none_or(|code| u32::try_from(code).is_ok());
+        Ok(Self(match Checked::<T>::deserialize(&value).map_err(D::Error::custom)? {
+            Checked::Valid(known) if is_whole => Ok(known),
+            _ => Err(value),
+        }))
+    }
+}
 
 /// Extension objects by name.
 pub(super) type Extensions = Map<String, Value>;
@@ -57,12 +103,12 @@ pub(super) struct Accessor {
     pub buffer_view: Option<usize>,
     #[serde(default)]
     pub byte_offset: u64,
-    pub component_type: u64,
+    pub component_type: Listed<GenericComponentType>,
     #[serde(default)]
     pub normalized: bool,
     pub count: u64,
     #[serde(rename = "type")]
-    pub kind: String,
+    pub kind: Listed<Type>,
     pub sparse: Option<Sparse>,
 }
 
@@ -81,7 +127,7 @@ pub(super) struct SparseIndices {
     pub buffer_view: usize,
     #[serde(default)]
     pub byte_offset: u64,
-    pub component_type: u64,
+    pub component_type: Listed<IndexComponentType>,
 }
 
 /// `accessors[i].sparse.values`.
@@ -137,8 +183,8 @@ pub(super) struct Texture {
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Sampler {
-    pub wrap_s: Option<u64>,
-    pub wrap_t: Option<u64>,
+    pub wrap_s: Option<Listed<WrappingMode>>,
+    pub wrap_t: Option<Listed<WrappingMode>>,
 }
 
 /// `materials[i]`.
@@ -146,7 +192,7 @@ pub(super) struct Sampler {
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Material {
     pub alpha_cutoff: Option<f64>,
-    pub alpha_mode: Option<String>,
+    pub alpha_mode: Option<Listed<AlphaMode>>,
     pub double_sided: bool,
     pub pbr_metallic_roughness: Pbr,
 }
@@ -195,7 +241,7 @@ pub(super) struct Primitive {
     pub attributes: BTreeMap<String, usize>,
     pub indices: Option<usize>,
     pub material: Option<usize>,
-    pub mode: Option<u64>,
+    pub mode: Option<Listed<Mode>>,
     #[serde(default)]
     pub targets: Vec<BTreeMap<String, usize>>,
     #[serde(default)]

@@ -8,10 +8,11 @@
 use super::{
     Fault, Material, Notices,
     accessor::Data,
-    document::{self, TextureInfo, TextureTransform, record},
+    document::{self, Listed, TextureInfo, TextureTransform, record},
 };
 use crate::gltf_file::{GltfFile, UriError};
 use glam::{DAffine2, DVec2};
+use gltf::json::{material::AlphaMode, texture::WrappingMode};
 use image::{ImageFormat, ImageReader, Limits, RgbaImage};
 use shadowfit_solver::mesh::{Cutout, Sides};
 use std::{collections::HashMap, io::Cursor, sync::Arc};
@@ -21,10 +22,6 @@ pub const MAX_IMAGE_TEXELS: u64 = 1 << 26;
 
 /// Texels of all images and cut-outs together: 1 GiB decoded. Sixteen textures of 4096 x 4096 fit.
 pub const MAX_TEXELS: u64 = 1 << 28;
-
-/// Texels clamp to the edge; REPEAT is the default.
-const CLAMP_TO_EDGE: u64 = 33071;
-const MIRRORED_REPEAT: u64 = 33648;
 
 /// What the triangles of a material need.
 #[derive(Clone, Copy, Debug)]
@@ -73,13 +70,6 @@ enum NoImage {
     Missing(Fault),
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum AlphaMode {
-    Opaque,
-    Mask,
-    Blend,
-}
-
 impl<'a> Surfaces<'a> {
     /// All materials with their factors, none of them prepared.
     pub(super) fn new(file: &'a GltfFile<'a>, data: &'a Data<'a>) -> Self {
@@ -115,7 +105,10 @@ impl<'a> Surfaces<'a> {
 
     fn prepare(&mut self, record: &document::Material, slot: usize, notices: &mut Notices) -> Result<Surface, Fault> {
         let pointer = format!("/materials/{}", slot.saturating_sub(1));
-        let mode = alpha_mode(record, &pointer)?;
+        let mode = match &record.alpha_mode {
+            Some(mode) => mode.get(&format!("{pointer}/alphaMode"))?,
+            None => AlphaMode::Opaque,
+        };
         if mode == AlphaMode::Blend {
             notices.add("blended materials", 1, "alphaMode BLEND: taken as opaque, and so it casts a full shadow");
         }
@@ -164,9 +157,9 @@ impl<'a> Surfaces<'a> {
                 let fault = Fault::index(&format!("{at}/sampler"), index, "samplers", document.samplers.len());
                 return Err(NoImage::Refused(fault));
             };
-            let wraps = [sampler.wrap_s, sampler.wrap_t];
-            self.materials[slot].repeat = wraps.map(|wrap| wrap != Some(CLAMP_TO_EDGE));
-            if wraps.contains(&Some(MIRRORED_REPEAT)) {
+            let wraps = [&sampler.wrap_s, &sampler.wrap_t].map(|wrap| wrap.as_ref().and_then(Listed::known));
+            self.materials[slot].repeat = wraps.map(|wrap| wrap != Some(WrappingMode::ClampToEdge));
+            if wraps.contains(&Some(WrappingMode::MirroredRepeat)) {
                 notices.add("mirrored textures", 1, "MIRRORED_REPEAT: taken as REPEAT");
             }
         }
@@ -266,24 +259,12 @@ impl<'a> Surfaces<'a> {
 /// The factors of a material, without its texture.
 fn plain(record: &document::Material) -> Material {
     let factor = record.pbr_metallic_roughness.base_color_factor.unwrap_or([1.0; 4]);
-    let is_mask = record.alpha_mode.as_deref() == Some("MASK");
+    let is_mask = record.alpha_mode.as_ref().and_then(Listed::known) == Some(AlphaMode::Mask);
     Material {
         base_color: factor.map(|x| x.clamp(0.0, 1.0) as f32),
         image: None,
         repeat: [true; 2],
         alpha_cutoff: is_mask.then(|| record.alpha_cutoff.unwrap_or(0.5) as f32),
-    }
-}
-
-fn alpha_mode(record: &document::Material, pointer: &str) -> Result<AlphaMode, Fault> {
-    match record.alpha_mode.as_deref() {
-        None | Some("OPAQUE") => Ok(AlphaMode::Opaque),
-        Some("MASK") => Ok(AlphaMode::Mask),
-        Some("BLEND") => Ok(AlphaMode::Blend),
-        Some(other) => {
-            let reason = format!("{other:?}, but only OPAQUE, MASK and BLEND exist");
-            Err(Fault::new(format!("{pointer}/alphaMode"), reason))
-        }
     }
 }
 
