@@ -9,6 +9,9 @@
 //! sizes. Not guaranteed: that a file with rules broken which concern no triangle (animations, cameras, unused
 //! records) is refused; it is read.
 //!
+//! The JSON is decoded here and not by the `gltf` crate (see `document`), whose enumerations are used; the
+//! container is that of [`gltf_file`].
+//!
 //! ```no_run
 //! let scene = shadowfit::scene::load(std::path::Path::new("teapot.glb"))?;
 //! println!("{} triangles", scene.soup.corners_model.len());
@@ -29,7 +32,7 @@ pub use materials::{MAX_IMAGE_TEXELS, MAX_TEXELS};
 pub use primitive::MAX_COORDINATE;
 
 use crate::gltf_file::{self, GltfFile, Invalid};
-use glam::{Vec2, Vec3};
+use glam::{DAffine3, Vec2, Vec3};
 use serde::Serialize;
 use shadowfit_solver::mesh::Soup;
 use std::{
@@ -158,6 +161,18 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Scene, Fault> {
     let mut scene = assembly::assemble(&file, &data, &hierarchy, &mut notices)?;
     scene.skipped = notices.list;
     Ok(scene)
+}
+
+/// Model space from the space of each node of a glTF file.
+///
+/// # Errors
+/// A record of the wrong shape, a hierarchy that is not a forest, or a transform that is not finite and affine.
+pub(crate) fn node_transforms(file: &GltfFile<'_>) -> Result<Vec<DAffine3>, Invalid> {
+    let hierarchy = document::Document::parse(file.root()).and_then(|document| nodes::Hierarchy::new(&document));
+    hierarchy.map(|hierarchy| hierarchy.model_from_node).map_err(|fault| match fault {
+        Fault::Invalid { pointer, reason } => Invalid { pointer, reason },
+        Fault::Unsupported { .. } => Invalid { pointer: String::new(), reason: fault.to_string() },
+    })
 }
 
 /// An error that does not know its file yet.

@@ -7,8 +7,11 @@
 use super::{
     AssetError, Bounds, Channel, EXTENSION, Encoding, ModelPlane, Rectangle, ShadowSet, atlas, files, pointer::At,
 };
-use crate::gltf_file::{GltfFile, UriError};
-use glam::{DMat4, DQuat, DVec3};
+use crate::{
+    gltf_file::{GltfFile, UriError},
+    scene,
+};
+use glam::{DAffine3, DVec3};
 use image::{ImageFormat, ImageReader, RgbImage};
 use serde::Deserialize;
 use serde_json::Value;
@@ -34,10 +37,10 @@ pub fn read(path: &Path) -> Result<ShadowSet, AssetError> {
         };
     }
     file.check_version().map_err(|fault| AssetError::invalid(path, fault))?;
-    let (index, model_from_frame) = frame_node(&root)?;
+    let (index, model_from_frame) = frame_node(&file, &root)?;
     let sets = root.member("extensions")?.member(EXTENSION)?.member("sets")?.elements()?;
     let mut set = read_set(&index.follow(&sets)?, &mut atlases)?;
-    if model_from_frame != DMat4::IDENTITY {
+    if model_from_frame != DAffine3::IDENTITY {
         set.transform(&model_from_frame);
     }
     Ok(set)
@@ -153,7 +156,7 @@ impl Atlases<'_> {
 }
 
 /// The `set` of the frame node, and the transform from its space to model space.
-fn frame_node<'a>(root: &At<'a>) -> Result<(At<'a>, DMat4), AssetError> {
+fn frame_node<'a>(file: &GltfFile<'_>, root: &At<'a>) -> Result<(At<'a>, DAffine3), AssetError> {
     let nodes = root.optional_elements("nodes")?;
     let label = |node: &At<'a>| node.optional("extensions").and_then(|e| e.optional(EXTENSION));
     let frames: Vec<usize> = (0..nodes.len()).filter(|&i| label(&nodes[i]).is_some()).collect();
@@ -161,51 +164,25 @@ fn frame_node<'a>(root: &At<'a>) -> Result<(At<'a>, DMat4), AssetError> {
         [frame] => (*frame, nodes[*frame].member("extensions")?.member(EXTENSION)?.member("set")?),
         _ => return Err(root.error(format!("{} nodes carry {EXTENSION}, one expected", frames.len()))),
     };
-    let mut parents = vec![None; nodes.len()];
-    for (i, node) in nodes.iter().enumerate() {
-        for child in node.optional_elements("children")? {
-            child.follow(&nodes)?;
-            parents[child.parse::<usize>()?] = Some(i);
-        }
-    }
-    let mut model_from_frame = local_transform(&nodes[frame])?;
-    let mut node = frame;
-    let mut height = 0;
-    while let Some(parent) = parents[node] {
-        height += 1;
-        if height > nodes.len() {
-            return Err(nodes[frame].error("the node is its own ancestor".into()));
-        }
-        model_from_frame = local_transform(&nodes[parent])? * model_from_frame;
-        node = parent;
-    }
-    let determinant = model_from_frame.determinant();
-    if !(model_from_frame.is_finite() && determinant.is_finite() && determinant != 0.0) {
-        return Err(nodes[frame].error("the node's transform has no inverse".into()));
-    }
-    Ok((set, model_from_frame))
-}
-
-/// A node's own transform.
-fn local_transform(node: &At<'_>) -> Result<DMat4, AssetError> {
-    if let Some(matrix) = node.optional("matrix") {
-        return Ok(DMat4::from_cols_array(&matrix.parse()?));
-    }
-    let vector = |key: &str, default| node.optional(key).map_or(Ok(default), |at| at.parse::<DVec3>());
-    let rotation = node.optional("rotation").map_or(Ok(DQuat::IDENTITY), |at| at.parse::<DQuat>())?;
-    let (scale, translation) = (vector("scale", DVec3::ONE)?, vector("translation", DVec3::ZERO)?);
-    Ok(DMat4::from_scale_rotation_translation(scale, rotation.normalize(), translation))
+    let transforms = scene::node_transforms(file).map_err(|fault| AssetError::invalid(file.path(), fault))?;
+    let is_invertible = |transform: &&DAffine3| {
+        let determinant = transform.matrix3.determinant();
+        determinant.is_finite() && determinant != 0.0
+    };
+    let no_inverse = || nodes[frame].error("the node's transform has no inverse".into());
+    let model_from_frame = transforms.get(frame).filter(is_invertible).ok_or_else(no_inverse)?;
+    Ok((set, *model_from_frame))
 }
 
 impl ShadowSet {
     /// Moves the set by an affine transform.
-    fn transform(&mut self, matrix: &DMat4) {
-        let determinant = matrix.determinant();
+    fn transform(&mut self, transform: &DAffine3) {
+        let determinant = transform.matrix3.determinant();
         for plane in &mut self.planes {
             let rectangle = &mut plane.rectangle;
-            rectangle.origin = matrix.transform_point3(rectangle.origin);
-            rectangle.u_axis = matrix.transform_vector3(rectangle.u_axis);
-            rectangle.v_axis = matrix.transform_vector3(rectangle.v_axis);
+            rectangle.origin = transform.transform_point3(rectangle.origin);
+            rectangle.u_axis = transform.transform_vector3(rectangle.u_axis);
+            rectangle.v_axis = transform.transform_vector3(rectangle.v_axis);
             // A bias has no direction: the mean scale is the best there is.
             plane.bias *= determinant.abs().cbrt();
             // A mirror turns u x v to the other side of the plane.
@@ -218,7 +195,7 @@ impl ShadowSet {
         let Bounds { min, max } = self.bounds;
         let corner =
             |i: usize| DVec3::from_array([0, 1, 2].map(|axis| if i >> axis & 1 == 0 { min[axis] } else { max[axis] }));
-        let corners = (0..8).map(|i| matrix.transform_point3(corner(i)));
+        let corners = (0..8).map(|i| transform.transform_point3(corner(i)));
         let (low, high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (min, max) = corners.fold((low, high), |(low, high), p| (low.min(p), high.max(p)));
         self.bounds = Bounds { min, max };

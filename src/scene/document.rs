@@ -5,8 +5,7 @@
 //!
 //! The enumerations (component types, modes, ..) are those of the `gltf` crate, the records are not: it cuts
 //! indices to 32 bits without a word, refuses a scene without `nodes` (which is legal), rounds node transforms to
-//! f32, reports errors without a JSON pointer. The tests use its readers as
-//! the second opinion.
+//! f32 and reports errors without a JSON pointer. The tests use its readers as the second opinion.
 
 use super::Fault;
 use gltf::json::{
