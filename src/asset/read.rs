@@ -128,11 +128,14 @@ impl Atlases<'_> {
             return self.uri_bytes(&uri);
         }
         let view = image.member("bufferView")?.follow(&self.root.optional_elements("bufferViews")?)?;
-        let buffer = view.member("buffer")?.follow(&self.root.optional_elements("buffers")?)?;
+        let buffer_index = view.member("buffer")?;
+        let buffer = buffer_index.follow(&self.root.optional_elements("buffers")?)?;
+        // The binary chunk stands for buffer 0 only.
+        let bin = if buffer_index.parse::<usize>()? == 0 { self.file.chunks().bin } else { None };
         let offset: usize = view.optional("byteOffset").map_or(Ok(0), |offset| offset.parse())?;
         let length: usize = view.member("byteLength")?.parse()?;
         let loaded;
-        let bytes = match (buffer.optional("uri"), self.file.chunks().bin) {
+        let bytes = match (buffer.optional("uri"), bin) {
             (Some(uri), _) => {
                 loaded = self.uri_bytes(&uri)?;
                 loaded.as_slice()

@@ -30,6 +30,9 @@ fn external_buffers() {
     // A bare `%` is what some exporters write.
     fs::write(folder.path().join("100%.bin"), Model::triangle().bin).unwrap();
     load_in(folder.path(), "model.gltf", gltf("100%.bin").as_bytes()).unwrap();
+    // An exporter that does not encode: the name itself has an escape in it.
+    fs::write(folder.path().join("a%41.bin"), Model::triangle().bin).unwrap();
+    load_in(folder.path(), "model.gltf", gltf("a%41.bin").as_bytes()).unwrap();
 }
 
 #[test]
@@ -69,7 +72,8 @@ fn external_files_come_once_in_order() {
     let text = json!({
         "asset": {"version": "2.0"},
         "buffers": [{"byteLength": 1, "uri": "b.bin"}, {"byteLength": 1, "uri": "./b.bin"}, {"byteLength": 1}],
-        "images": [{"uri": "t/%C3%A4.png"}, {"uri": "data:image/png;base64,"}, {"uri": "a.jpg"}, {"bufferView": 0}]
+        "images": [{"uri": "t/%C3%A4.png"}, {"uri": "data:image/png;base64,"}, {"uri": "a.jpg"}, {"bufferView": 0},
+            {"uri": "https://example.org/a.png"}]
     });
     assert_eq!(external_files(Path::new("."), &text.to_string()).unwrap(), ["b.bin", "t/ä.png", "a.jpg"]);
 }
@@ -166,9 +170,18 @@ fn harmless_oddities_of_a_glb() {
     let length = (bytes.len() as u32).to_le_bytes();
     bytes[8..12].copy_from_slice(&length);
     load_bytes("model.glb", &bytes).unwrap();
-    // Up to three bytes of padding behind the buffer.
+    // JSON padded with zeros, and up to three bytes of padding behind the buffer.
     let mut model = model;
     model.json["buffers"][0]["byteLength"] = json!(36);
     model.bin.extend([0; 3]);
-    load_bytes("model.glb", &glb(model.text().as_bytes(), &model.bin)).unwrap();
+    let text = format!("{}\0\0", model.text());
+    load_bytes("model.glb", &glb(text.as_bytes(), &model.bin)).unwrap();
+    // The same without padding, the chunk's length not a multiple of four.
+    let mut bytes = glb(model.text().as_bytes(), &model.bin);
+    bytes.pop();
+    let length = bytes.len() as u32;
+    bytes[8..12].copy_from_slice(&length.to_le_bytes());
+    let at = bytes.len() - 39 - 8;
+    bytes[at..at + 4].copy_from_slice(&39_u32.to_le_bytes());
+    load_bytes("model.glb", &bytes).unwrap();
 }
