@@ -3,7 +3,9 @@
 mod scenes;
 
 use glam::{DVec3, Vec3};
-use scenes::{KNOT_TUBE, closed, cuboid, knot, knot_centre, mapped, soup, sphere, terrain, terrain_height, unit_vector};
+use scenes::{
+    KNOT_TUBE, closed, cuboid, knot, knot_centre, mapped, soup, sphere, terrain, terrain_height, unit_vector,
+};
 use shadowfit_solver::{
     mesh::{Mesh, Sides},
     sampling::uniform,
@@ -263,11 +265,8 @@ fn small_features_on_a_large_model_are_hit() {
     // A box of 1e-4 of the model's radius on a floor; the loop's margin is 4 % of the box.
     let floor = scenes::quad(DVec3::new(-1.0, 0.0, -1.0), DVec3::Z * 2.0, DVec3::X * 2.0);
     let centre = DVec3::new(0.61, 1e-4, -0.37);
-    let mesh = Mesh::new(&soup(&[
-        (&floor, Sides::Front),
-        (&cuboid(centre, DVec3::splat(1e-4), 1), Sides::Front),
-    ]))
-    .unwrap();
+    let mesh =
+        Mesh::new(&soup(&[(&floor, Sides::Front), (&cuboid(centre, DVec3::splat(1e-4), 1), Sides::Front)])).unwrap();
     let middle = mesh.frame.unit_from_model(centre);
     let mut blocked = 0;
     let undecided = compare(&mesh, 20_000, |i| {

@@ -82,7 +82,10 @@ fn coplanar_and_doubled_shells_do_not_shadow_each_other() {
     let mesh = Mesh::new(&soup(&[(&shell, Sides::Front), (&inside_out, Sides::Front)])).unwrap();
     assert_eq!((mesh.triangle_count(), mesh.duplicates), (2 * shell.len(), 0));
     let receivers = receivers(&mesh, 10_000, 7);
-    assert!(receivers.points.iter().zip(&receivers.normals).all(|(p, n)| p.dot(*n) > 0.0), "an inner receiver was kept");
+    assert!(
+        receivers.points.iter().zip(&receivers.normals).all(|(p, n)| p.dot(*n) > 0.0),
+        "an inner receiver was kept"
+    );
     assert_eq!(blocked_pairs(&mesh, &receivers).0, 0, "doubled shell");
 }
 

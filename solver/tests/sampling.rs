@@ -86,9 +86,8 @@ fn lights_have_equal_solid_angles() {
     }
     // Second moments of the sphere: a third each, nothing across.
     let lights = LightDomain::Sphere.directions(count, 3);
-    let outer = lights.iter().map(|l| l.as_dvec3()).fold(DMat3::ZERO, |m, l| {
-        m + DMat3::from_cols(l * l.x, l * l.y, l * l.z)
-    });
+    let outer =
+        lights.iter().map(|l| l.as_dvec3()).fold(DMat3::ZERO, |m, l| m + DMat3::from_cols(l * l.x, l * l.y, l * l.z));
     let error = outer * (1.0 / count as f64) - DMat3::from_diagonal(DVec3::splat(1.0 / 3.0));
     assert!(error.to_cols_array().iter().all(|e| e.abs() < 5.0 / count as f64), "{error}");
 }
@@ -111,8 +110,23 @@ fn domains_parse_or_say_why_not() {
     assert_eq!("cone:135, 20, 5".parse(), Ok(cone(135.0, 20.0, 5.0)));
     assert_eq!("cone:-400,-90,180".parse(), Ok(cone(-400.0, -90.0, 180.0)));
     for text in [
-        "", "Sphere", "sphere ", "cone", "cone:", "cone:1,2", "cone:1,2,3,4", "cone:a,2,3", "cone:0,91,10", "cone:0,0,0",
-        "cone:0,0,-5", "cone:0,0,181", "cone:nan,0,10", "cone:0,nan,10", "cone:0,0,nan", "cone:inf,0,10", "cone:0,0,inf",
+        "",
+        "Sphere",
+        "sphere ",
+        "cone",
+        "cone:",
+        "cone:1,2",
+        "cone:1,2,3,4",
+        "cone:a,2,3",
+        "cone:0,91,10",
+        "cone:0,0,0",
+        "cone:0,0,-5",
+        "cone:0,0,181",
+        "cone:nan,0,10",
+        "cone:0,nan,10",
+        "cone:0,0,nan",
+        "cone:inf,0,10",
+        "cone:0,0,inf",
     ] {
         let error = text.parse::<LightDomain>().expect_err(text);
         assert!(error.to_string().contains(&format!("'{text}'")), "{error}");
@@ -239,7 +253,10 @@ fn receivers_repeat_with_the_seed_and_change_with_it() {
     let mesh = closed(&scenes::knot(48, 8));
     let one = receivers(&mesh, 2_000, 1);
     let again = receivers(&mesh, 2_000, 1);
-    assert_eq!((&one.points, &one.origins, &one.normals, &one.weights), (&again.points, &again.origins, &again.normals, &again.weights));
+    assert_eq!(
+        (&one.points, &one.origins, &one.normals, &one.weights),
+        (&again.points, &again.origins, &again.normals, &again.weights)
+    );
     let points: BTreeSet<_> = one.points.iter().map(|p| bits(*p)).collect();
     let other = receivers(&mesh, 2_000, 2);
     assert_eq!(other.points.iter().filter(|p| points.contains(&bits(**p))).count(), 0);

@@ -195,9 +195,7 @@ pub const PLATE_SCENE: [f64; 3] = [2.0, 0.5, 0.5];
 /// A square plate, both sides drawn, over square ground drawn from above.
 pub fn plate_over_ground() -> Soup {
     let [ground, plate, height] = PLATE_SCENE;
-    let square = |half: f64, y: f64| {
-        quad(DVec3::new(-half, y, -half), DVec3::Z * 2.0 * half, DVec3::X * 2.0 * half)
-    };
+    let square = |half: f64, y: f64| quad(DVec3::new(-half, y, -half), DVec3::Z * 2.0 * half, DVec3::X * 2.0 * half);
     soup(&[(&square(ground, 0.0), Sides::Front), (&square(plate, height), Sides::Both)])
 }
 
