@@ -75,7 +75,7 @@ fn compare(mesh: &Mesh, count: u64, ray: impl Fn(u64) -> (Vec3, Vec3)) -> usize 
             undecided += 1;
         }
         // Front sides of even triangles and back sides of odd ones.
-        let drawn = |triangle: usize, front: bool| front == (triangle % 2 == 0);
+        let drawn = |triangle: usize, front: bool| front == triangle.is_multiple_of(2);
         let some = truth(mesh, origin, direction, drawn);
         let hit = mesh.nearest(origin, direction, |t, front| drawn(t as usize, front));
         let distance = hit.map_or(f64::INFINITY, |h| f64::from(h.distance));
@@ -93,7 +93,7 @@ fn compare(mesh: &Mesh, count: u64, ray: impl Fn(u64) -> (Vec3, Vec3)) -> usize 
 fn any_ray(i: u64) -> (Vec3, Vec3) {
     let origin = unit_vector(1, i) * (1.5 * uniform(2, i) as f32);
     let target = unit_vector(3, i) * uniform(4, i) as f32;
-    let direction = if i % 2 == 0 { unit_vector(5, i) } else { (target - origin).normalize() };
+    let direction = if i.is_multiple_of(2) { unit_vector(5, i) } else { (target - origin).normalize() };
     (origin, direction)
 }
 

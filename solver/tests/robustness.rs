@@ -19,7 +19,7 @@ fn turned(triangles: &Triangles) -> Triangles {
 /// A direction above the surface at receiver `i`: any, or grazing with n.l between 1e-6 and 1.
 fn light_above(normal: Vec3, i: u64) -> Option<Vec3> {
     let any = unit_vector(61, i);
-    let light = if i % 2 == 0 {
+    let light = if i.is_multiple_of(2) {
         any
     } else {
         let cosine = 10f32.powf(-6.0 * uniform(62, i) as f32);
