@@ -29,8 +29,6 @@ fn options(seed: u64) -> FitOptions {
     let mut options = fit_options(4, seed);
     options.candidates.directions = 48;
     options.candidates.surface_points = 64;
-    options.selection.finalists = 8;
-    options.selection.refined = 2;
     options.selection.refine_steps = 5;
     options
 }
@@ -187,7 +185,8 @@ fn bytes(planes: &[BakedPlane]) -> Vec<u8> {
             out.extend(v.to_array().iter().flat_map(|c| c.to_bits().to_le_bytes()));
         }
         out.extend(bias.to_bits().to_le_bytes());
-        out.extend([*side as u8, texture.width as u8, texture.height as u8]);
+        out.push(*side as u8);
+        out.extend([texture.width, texture.height].iter().flat_map(|n| n.to_le_bytes()));
         out.extend(&texture.coverage);
     }
     out
@@ -217,7 +216,7 @@ fn metrics_add_up() {
     assert_eq!((none.receivers, none.lights), (pairs.receivers, HELD_OUT.lights));
     // Nothing is missed where everything is dark, and half as much is with half coverage.
     let all = measure(&lids(255), &pairs);
-    assert!(all.missed < 0.01 && close(all.false_, lit_per_shadow * all.false_ / lit_per_shadow), "{all:?}");
+    assert!(all.missed < 0.01, "{all:?}");
     assert!((all.false_ / lit_per_shadow - 1.0).abs() < 0.01, "{all:?} of {lit_per_shadow}");
     let half = measure(&lids(51), &pairs);
     assert!((half.missed - 0.8).abs() < 0.01 && (half.false_ / lit_per_shadow - 0.2).abs() < 0.01, "{half:?}");

@@ -280,8 +280,9 @@ fn small_features_on_a_large_model_are_hit() {
         blocked += usize::from(mesh.is_blocked(middle - direction * 0.5, direction));
     }
     assert_eq!(blocked, 2_000, "rays through the middle of the small box");
-    // A band of 2 x 4e-6 around the outline of a box 1.4e-4 wide, seen among rays spread over 4e-4.
-    assert!(undecided < 1_500, "{undecided} of 20000 undecided");
+    // A band of 2 x 4e-6 around the outline, some 8e-4 long, among rays spread over a disc of 3e-4: 2 %; most of
+    // them have the floor behind.
+    assert!(undecided < 400, "{undecided} of 20000 undecided");
 }
 
 #[test]

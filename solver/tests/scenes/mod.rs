@@ -30,15 +30,15 @@ pub struct FitOptions {
 /// The one place where tests and benches choose the options of a search.
 pub fn fit_options(max_planes: usize, seed: u64) -> FitOptions {
     FitOptions {
-        candidates: CandidateOptions { directions: 96, offsets: 12, surface_points: 256, seed },
+        candidates: CandidateOptions { directions: 64, offsets: 12, surface_points: 128, seed },
         selection: SelectionOptions {
             max_planes,
             min_gain: 0.005,
             texels: 64,
             screening_pairs: 4_000,
-            finalists: 16,
-            refined: 4,
-            refine_steps: 7,
+            finalists: 8,
+            refined: 2,
+            refine_steps: 6,
             replace_rounds: 1,
         },
         bake: BakeOptions { texture_size: 128, rounds: 3, smoothing: 1, turn: Turn::Free },
