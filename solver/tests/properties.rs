@@ -13,7 +13,7 @@ use shadowfit_solver::{
     receivers::{ReceiverOptions, Receivers, sample},
     rectangle::around_section,
     sampling::uniform,
-    visibility::{Pairs, trace},
+    visibility::{LightPairs, Pairs, trace},
     votes::{BIAS, Mask, best_mask, score, uncovered},
 };
 
@@ -34,7 +34,7 @@ fn options(seed: u64) -> FitOptions {
 }
 
 fn fitted(soup: &Soup, seed: u64) -> (Vec<BakedPlane>, Metrics) {
-    let mesh = Mesh::new(soup).unwrap();
+    let mesh = Mesh::new(soup).expect("the scene has triangles");
     let (_, baked) = fit(&mesh, &pairs(&mesh, &Sampling { seed, ..TRAINING }), &options(seed));
     let metrics = measure(&baked, &pairs(&mesh, &HELD_OUT));
     (baked, metrics)
@@ -122,6 +122,35 @@ fn a_score_is_the_drop_of_the_error_where_both_folds_agree() {
         worthwhile += usize::from(drop > 0.01 * pairs.shadow_weight);
     }
     assert!(worthwhile > 5, "only {worthwhile} planes gain anything");
+}
+
+/// Pairs of one light whose rays cross the plane y = 0 at (x, 0); the first `split` are fold 0.
+fn crossings(light: Vec3, pairs: &[(f32, f32)], split: usize) -> LightPairs {
+    let (x, vote): (Vec<f32>, Vec<f32>) = pairs.iter().copied().unzip();
+    let n = x.len();
+    LightPairs { light, x, y: vec![-0.5 * light.y; n], z: vec![0.0; n], vote, split }
+}
+
+#[test]
+fn scores_cross_validate_and_choose_the_side() {
+    let plane = ShadowPlane { origin: Vec3::new(-1.0, 0.0, -1.0), u: Vec3::Z * 2.0, v: Vec3::X * 2.0 };
+    let found = |lights: Vec<LightPairs>| {
+        let pairs = Pairs { lights, shadow_weight: 1.0, total_weight: 1.0, receivers: 1 };
+        let score = score(&pairs, &plane, 64);
+        (score.gain, score.side)
+    };
+    let agree = [(0.3, 1.0), (0.3, 2.0)];
+    // Behind the normal +Y the light is above. Each fold lets the other's vote in.
+    assert_eq!(found(vec![crossings(Vec3::Y, &agree, 1)]), (3.0, Side::Both));
+    // Lit receivers of more weight on the other side: serve one side only.
+    let lit = [(0.3, -4.0), (0.3, -4.0)];
+    assert_eq!(found(vec![crossings(Vec3::Y, &agree, 1), crossings(Vec3::NEG_Y, &lit, 1)]), (3.0, Side::Back));
+    assert_eq!(found(vec![crossings(Vec3::NEG_Y, &agree, 1), crossings(Vec3::Y, &lit, 1)]), (3.0, Side::Front));
+    // Folds that disagree: fold 0 would block at -0.3 and loses 2, fold 1 would block at 0.3 and loses 5. The same
+    // from either side, so that serving one loses less than serving both.
+    let disagree = [(-0.3, 1.0), (0.3, -5.0), (-0.3, -2.0), (0.3, 1.0)];
+    let (gain, _) = found(vec![crossings(Vec3::Y, &disagree, 2), crossings(Vec3::NEG_Y, &disagree, 2)]);
+    assert_eq!(gain, -7.0);
 }
 
 #[test]
@@ -233,8 +262,10 @@ fn metrics_add_up() {
         let alone = Pairs { lights: vec![light], shadow_weight, ..pairs };
         measure(&[], &alone).shadow_error * shadow_weight / mean
     };
-    let worst = (0..pairs.lights.len()).map(one).fold(0.0, f64::max);
-    assert!(close(worst, none.worst_light.max), "{worst} {none:?}");
+    let mut by_light: Vec<f64> = (0..pairs.lights.len()).map(one).collect();
+    by_light.sort_by(f64::total_cmp);
+    // 80 lights: the largest, and the one that 95 % of the others do not exceed.
+    assert!(close(by_light[79], none.worst_light.max) && close(by_light[75], none.worst_light.p95), "{none:?}");
 }
 
 #[test]
