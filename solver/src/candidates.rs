@@ -50,6 +50,9 @@ pub struct CandidateOptions {
     pub seed: u64,
 }
 
+/// Planes square to the axes have this many times the offsets of the others.
+const AXIS_FINENESS: usize = 4;
+
 /// All candidates of a mesh, in a fixed order.
 #[must_use]
 pub fn generate(mesh: &Mesh, options: &CandidateOptions) -> Vec<Candidate> {
@@ -66,14 +69,15 @@ pub fn generate(mesh: &Mesh, options: &CandidateOptions) -> Vec<Candidate> {
 
 fn uniform_planes(mesh: &Mesh, options: &CandidateOptions) -> Vec<Candidate> {
     let mut out = Vec::with_capacity(options.directions * options.offsets);
-    // The three axes first: models are built along them.
-    let axes = [Vec3::X, Vec3::Y, Vec3::Z];
+    // The three axes first, and finer: models are built along them, with rims, floors and rings that a plane must hit
+    // within a hundredth of their size.
+    let axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| (axis, options.offsets * AXIS_FINENESS));
     let lattice = LightDomain::Hemisphere.directions(options.directions, options.seed);
-    for normal in axes.into_iter().chain(lattice) {
+    for (normal, offsets) in axes.into_iter().chain(lattice.into_iter().map(|n| (n, options.offsets))) {
         let heights = || mesh.corners.iter().flatten().map(|p| normal.dot(*p));
         let (low, high) = heights().fold((f32::MAX, f32::MIN), |(l, h), x| (l.min(x), h.max(x)));
-        for k in 0..options.offsets {
-            let offset = low + (high - low) * (k as f32 + 0.5) / options.offsets as f32;
+        for k in 0..offsets {
+            let offset = low + (high - low) * (k as f32 + 0.5) / offsets as f32;
             out.push(Candidate { normal, offset, origin: Generator::Uniform });
         }
     }

@@ -19,8 +19,9 @@ use crate::{
     mesh::Mesh,
     plane::ShadowPlane,
     rectangle::{Turn, around_section, tighten},
+    sampling::hash,
     visibility::Pairs,
-    votes::{Mask, best_mask, score, thinned, uncovered},
+    votes::{Mask, best_mask, error, score, thinned, uncovered},
 };
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
@@ -50,6 +51,8 @@ pub struct SelectionOptions {
     pub refine_steps: usize,
     /// Replace rounds; each costs about as much as the greedy search.
     pub replace_rounds: usize,
+    /// Times that some planes are taken out together and searched anew; each costs a little more than a replace round.
+    pub kicks: usize,
 }
 
 /// What the caller says to a set of planes.
@@ -76,6 +79,9 @@ pub struct Selection {
 
 /// A replacement must gain this much more (relative): less is noise and would never settle.
 const REPLACE_MARGIN: f64 = 1e-3;
+
+/// Planes that a kick takes out together.
+const KICKED: usize = 3;
 
 /// Stale candidates are re-scored in batches of this size, in parallel. Fixed, so that the outcome does not
 /// depend on the number of threads.
@@ -137,6 +143,9 @@ pub fn select(
             break;
         }
     }
+    for kick in 0..options.kicks {
+        replaced += search.kick(&mut planes, kick as u64);
+    }
     let mut dropped = search.drop_unpaid(&mut planes);
     if verdict == Verdict::Enough {
         dropped += search.shrink(&mut planes, judge);
@@ -186,6 +195,31 @@ impl Search<'_> {
             };
         }
         exchanges
+    }
+
+    /// Takes [`KICKED`] planes out together, fills up, lets all planes move once, and keeps what is better: leaves
+    /// local optima that exchanging one plane at a time does not (iterated local search). Returns 1 where it did.
+    fn kick(&self, planes: &mut Vec<Mask>, seed: u64) -> usize {
+        let count = planes.len();
+        if count <= KICKED {
+            return 0;
+        }
+        let mut trial = planes.clone();
+        for k in 0..KICKED {
+            trial.remove((hash(seed, k as u64) % trial.len() as u64) as usize);
+        }
+        while trial.len() < count {
+            let open = uncovered(self.pairs, &trial.iter().collect::<Vec<_>>());
+            let mut bounds = vec![f64::INFINITY; self.candidates.len()];
+            let Some((_, mask)) = self.best_plane(&open, &mut bounds, None) else { break };
+            trial.push(mask);
+        }
+        self.replace_round(&mut trial);
+        let better = error(self.pairs, &trial) < error(self.pairs, planes);
+        if better {
+            *planes = trial;
+        }
+        usize::from(better)
     }
 
     /// What each plane gains given the others.

@@ -217,6 +217,18 @@ pub fn uncovered(pairs: &Pairs, masks: &[&Mask]) -> Pairs {
     Pairs { lights: pairs.lights.par_iter().map(filter).collect(), ..*pairs }
 }
 
+/// Weighted error of the masks' nearest texels: blocked pairs that none covers and lit ones that one does.
+#[must_use]
+pub fn error(pairs: &Pairs, masks: &[Mask]) -> f64 {
+    let open = uncovered(pairs, &masks.iter().collect::<Vec<_>>());
+    let sums = |pairs: &Pairs| {
+        let votes = pairs.lights.iter().flat_map(|light| &light.vote);
+        votes.fold((0.0, 0.0), |(b, l), &v| (b + f64::from(v.max(0.0)), l - f64::from(v.min(0.0))))
+    };
+    let ((missed, lit_left), (_, lit)) = (sums(&open), sums(pairs));
+    missed + lit - lit_left
+}
+
 /// Lit pairs of a receiver are drawn in proportion to the share of its light that is blocked, plus this. Smaller
 /// makes false shadows on receivers that are never shadowed noisy; larger wastes the sample on them.
 const LIT_FLOOR: f64 = 0.03;

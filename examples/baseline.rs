@@ -1,0 +1,145 @@
+//! Measures the program on its own models and on a folder of further ones, and writes the tracked tables.
+//!
+//!     cargo build --release --features flip
+//!     cargo run --release --features flip --example baseline -- [--validate short|full] [CORPUS_DIR]
+//!
+//! Each case is one run of the release binary beside this example, so that time and memory are its own. Writes
+//! `reports/baseline/models.{csv,md}`, and with a folder `reports/baseline/corpus.{csv,md}`.
+
+use serde_json::Value;
+use std::{
+    error::Error,
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+/// One run: what the table calls it, the model, further arguments.
+struct Case {
+    model: PathBuf,
+    name: String,
+    arguments: Vec<String>,
+}
+
+/// Columns of the tables: title, and where the report has the number.
+const COLUMNS: [(&str, &str); 14] = [
+    ("triangles", "/triangles"),
+    ("planes", "/planes"),
+    ("lookups", "/lookups/mean"),
+    ("shadow_error", "/held_out/shadow_error"),
+    ("missed", "/held_out/missed"),
+    ("false", "/held_out/false"),
+    ("worst_light", "/held_out/worst_light/max"),
+    ("training", "/training/shadow_error"),
+    ("mask_error", "/image/mask_error"),
+    ("flip", "/image/flip_mean"),
+    ("texture_bytes", "/texture_bytes"),
+    ("search_s", "/time_s/search"),
+    ("total_s", "/time_s/total"),
+    ("peak_bytes", "/peak_memory_bytes"),
+];
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments: Vec<String> = std::env::args().skip(1).collect();
+    let mut validate = "full".to_string();
+    if arguments.first().is_some_and(|a| a == "--validate") {
+        validate = arguments.drain(..2.min(arguments.len())).next_back().unwrap_or(validate);
+    }
+    let binary = std::env::current_exe()?.ancestors().nth(2).map(|dir| dir.join("shadowfit")).ok_or("no binary")?;
+    if !binary.exists() {
+        return Err(format!("{} is missing: cargo build --release --features flip", binary.display()).into());
+    }
+    run("models", &own_cases(), &binary, &validate)?;
+    if let Some(folder) = arguments.first() {
+        run("corpus", &corpus_cases(Path::new(folder))?, &binary, &validate)?;
+    }
+    Ok(())
+}
+
+/// The project's models: as they come, and where the published and hand-placed planes are to be compared.
+fn own_cases() -> Vec<Case> {
+    let by_hand = |file: &str| vec!["--planes".to_string(), format!("models/planes/{file}.planes.json")];
+    let planes = |n: usize| vec!["--max-planes".to_string(), n.to_string()];
+    [
+        ("teapot", planes(11)),
+        ("teapot", by_hand("teapot-by-hand")),
+        ("teapot", vec![]),
+        ("aircraft", planes(3)),
+        ("aircraft", by_hand("aircraft-thesis")),
+        ("aircraft", planes(8)),
+        ("aircraft", vec![]),
+        ("plate_over_ground", vec![]),
+        ("planted_planes", vec![]),
+        ("t_shape", vec![]),
+        ("sphere", vec![]),
+        ("box", vec![]),
+    ]
+    .into_iter()
+    .map(|(model, arguments)| {
+        let model = PathBuf::from(format!("models/{model}.glb"));
+        Case { name: format!("{} {}", model.display(), arguments.join(" ")).trim().to_string(), model, arguments }
+    })
+    .collect()
+}
+
+/// Every glTF file below a folder, by name; the three.js teapot also with the eleven planes of the thesis's count.
+fn corpus_cases(folder: &Path) -> Result<Vec<Case>, Box<dyn Error>> {
+    let (mut folders, mut models) = (vec![folder.to_path_buf()], Vec::new());
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder)? {
+            let path = entry?.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "glb" || e == "gltf") {
+                models.push(path);
+            }
+        }
+    }
+    models.sort();
+    let mut cases = Vec::new();
+    for model in models {
+        let name = model.strip_prefix(folder)?.display().to_string();
+        if name.ends_with("teapot_three.glb") {
+            let arguments = vec!["--max-planes".to_string(), "11".to_string()];
+            cases.push(Case { model: model.clone(), name: format!("{name} {}", arguments.join(" ")), arguments });
+        }
+        cases.push(Case { model, name, arguments: Vec::new() });
+    }
+    Ok(cases)
+}
+
+/// Runs the cases and writes the tables after each, so that a run that is cut short leaves what it has.
+fn run(table: &str, cases: &[Case], binary: &Path, validate: &str) -> Result<(), Box<dyn Error>> {
+    let titles: Vec<&str> = COLUMNS.iter().map(|(title, _)| *title).collect();
+    let mut csv = format!("case,exit,{}\n", titles.join(","));
+    let mut markdown = format!("| case | exit | {} |\n|---|{}\n", titles.join(" | "), "---|".repeat(titles.len() + 1));
+    fs::create_dir_all("reports/baseline")?;
+    for case in cases {
+        let out = tempfile::tempdir()?;
+        let output = Command::new(binary)
+            .args(["fit", "--json", "--validate", validate, "-o"])
+            .arg(out.path())
+            .arg(&case.model)
+            .args(&case.arguments)
+            .output()?;
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
+        let exit = output.status.code().map_or_else(|| "signal".to_string(), |code| code.to_string());
+        let cells: Vec<String> = COLUMNS.iter().map(|(_, pointer)| cell(report.pointer(pointer))).collect();
+        writeln!(csv, "{},{exit},{}", case.name, cells.join(","))?;
+        writeln!(markdown, "| {} | {exit} | {} |", case.name, cells.join(" | "))?;
+        println!("{} exit {exit}: {}", case.name, cells.join(" "));
+        fs::write(format!("reports/baseline/{table}.csv"), &csv)?;
+        fs::write(format!("reports/baseline/{table}.md"), &markdown)?;
+    }
+    Ok(())
+}
+
+/// Whole numbers as they are, others with four digits after the point, nothing where there is none.
+fn cell(value: Option<&Value>) -> String {
+    match value {
+        Some(Value::Number(n)) if n.is_u64() => n.to_string(),
+        Some(Value::Number(n)) => n.as_f64().map_or_else(String::new, |x| format!("{x:.4}")),
+        _ => String::new(),
+    }
+}
