@@ -24,7 +24,7 @@ mod write;
 
 pub use atlas::Channel;
 pub use read::{ModelRectangle, read, read_plane_file};
-pub use write::{AssetRequest, Written, WrittenAtlas, check_input, write};
+pub use write::{AssetRequest, Written, WrittenAtlas, check_input, check_outputs, write};
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

@@ -228,6 +228,10 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
     let (start, mut clock, mut time_s) = (Instant::now(), Clock(Instant::now()), Times::default());
     progress(format!("reading {}", request.model.display()));
     asset::check_input(&request.model)?;
+    let stem = stem_of(&request.model);
+    let inputs: Vec<&Path> =
+        [Some(&request.model), request.planes.as_ref()].into_iter().flatten().map(|p| &**p).collect();
+    asset::check_outputs(&request.out_dir, &stem, &inputs)?;
     let scene = scene::load(&request.model)?;
     time_s.load = clock.lap();
     let mesh_error = |source| FitError::Mesh { path: request.model.clone(), source };
@@ -245,7 +249,6 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
     let fitted = fit(request, &mesh, &pairs, progress, (&mut clock, &mut time_s))?;
 
     progress("writing the asset".to_string());
-    let stem = stem_of(&request.model);
     let (out_dir, bounds) = (request.out_dir.as_path(), receiver_bounds(&mesh, &receivers));
     let asset_request = AssetRequest {
         input: &request.model,
