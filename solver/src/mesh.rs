@@ -27,6 +27,12 @@ pub const BOX_PADDING: f32 = 4.0 * f32::EPSILON;
 /// units of ray length, which this makes 1e-7 of the model's radius.
 const BVH_SCALE: f32 = 1024.0;
 
+/// A point on a triangle is off by at most this much per axis, unit space. gamma(7) of corners up to 1 is 3.5 eps, the
+/// rest covers coplanar neighbours, whose corners are rounded too. A bound that shrank with the point's own coordinates
+/// (8 eps |p|) made a level plate through the centre shadow itself in 4 pairs of 10; at 1e-5 the contact shadows of
+/// parts of 1e-4 of the model would detach.
+pub const POINT_ERROR: f32 = 8.0 * f32::EPSILON;
+
 /// Which sides of a triangle are drawn, and so receive shadow. Every triangle blocks light from both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Sides {
@@ -317,12 +323,14 @@ fn bvh_ray(origin: Vec3, direction: Vec3) -> Ray {
 
 /// A ray's origin just outside the surface at `p` on the side of `normal`.
 ///
-/// A point computed from barycentric weights lies within `8 eps |p|` of its triangle, per axis (pbrt-v4, section
-/// 6.8.5, gamma(7), rounded up). The origin moves along the normal by that bound projected on it, and every
-/// component is then rounded away, so a ray that leaves the side it stands on cannot hit that side again.
+/// A point computed from barycentric weights lies within `gamma(7) (|b0 p0| + |b1 p1| + |b2 p2|)` of its triangle,
+/// per axis (pbrt-v4, section 6.8.5). The corners count, not the point: where large corners cancel, a point near a
+/// coordinate plane is as wrong as any other. No corner is farther than 1 from the centre, so [`POINT_ERROR`] bounds
+/// all points. The origin moves along the normal by that bound projected on it, and every component is then rounded
+/// away, so a ray that leaves the side it stands on cannot hit that side again.
 #[must_use]
 pub fn ray_origin(p: Vec3, normal: Vec3) -> Vec3 {
-    let bound = 8.0 * f32::EPSILON * p.abs().max(Vec3::splat(f32::EPSILON));
+    let bound = Vec3::splat(POINT_ERROR);
     let offset = normal * normal.abs().dot(bound);
     let moved = p + offset;
     let away = |x: f32, d: f32| match d {
@@ -337,6 +345,7 @@ pub fn ray_origin(p: Vec3, normal: Vec3) -> Vec3 {
 /// that it runs along +z.
 struct WatertightRay {
     origin: Vec3,
+    direction: Vec3,
     axes: [usize; 3],
     shear: Vec3,
 }
@@ -349,7 +358,7 @@ impl WatertightRay {
             std::mem::swap(&mut kx, &mut ky);
         }
         let inv = 1.0 / direction[kz];
-        Self { origin, axes: [kx, ky, kz], shear: Vec3::new(direction[kx] * inv, direction[ky] * inv, inv) }
+        Self { origin, direction, axes: [kx, ky, kz], shear: Vec3::new(direction[kx] * inv, direction[ky] * inv, inv) }
     }
 
     /// Distance and corner weights where the ray meets the triangle in front of its origin; edges count as hits.
@@ -375,7 +384,16 @@ impl WatertightRay {
             return None;
         }
         let weights = e / det;
-        let t = weights.dot(Vec3::new(a.z, b.z, c.z));
+        let t = self.distance(corners).unwrap_or_else(|| weights.dot(Vec3::new(a.z, b.z, c.z)));
         (t > 0.0).then_some((t, weights))
+    }
+
+    /// Distance to the triangle's plane in f64, `None` where it is edge-on. Interpolating it with the f32 weights is
+    /// wrong by 1e-4 on slivers, enough to put a surface that the ray has just left in front of it.
+    fn distance(&self, corners: &[Vec3; 3]) -> Option<f32> {
+        let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+        let normal = (b - a).cross(c - a);
+        let facing = self.direction.as_dvec3().dot(normal);
+        (facing != 0.0).then(|| ((a - self.origin.as_dvec3()).dot(normal) / facing) as f32)
     }
 }
