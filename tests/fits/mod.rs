@@ -1,8 +1,9 @@
 //! Fits through the library, for tests that look at results rather than at the program.
 
+pub use shadowfit::pipeline::FitRequest;
 use shadowfit::{
     asset::{ShadowSet, read},
-    pipeline::{Effort, FitError, FitRequest, run},
+    pipeline::{Effort, FitError, run},
     report::Report,
 };
 use shadowfit_solver::lights::LightDomain;
