@@ -150,3 +150,17 @@ fn plane_files_that_are_wrong_end_with_3() {
         assert!(!out.exists(), "{text}");
     }
 }
+
+#[test]
+fn outputs_for_the_khronos_validator() {
+    // `tests/khronos/validate.mjs` is run on these files by ./test: without planes, with one, with eleven.
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("khronos/cli");
+    let by_hand = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/planes/teapot-by-hand.planes.json");
+    for (name, more) in [
+        ("box", &[][..]),
+        ("plate_over_ground", &["--texture-size", "32"]),
+        ("teapot", &["--planes", by_hand.to_str().unwrap(), "--texture-size", "32"]),
+    ] {
+        fit(&model(name), &folder.join(name), more).ok();
+    }
+}
