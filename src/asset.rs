@@ -15,24 +15,23 @@
 
 pub mod atlas;
 pub mod files;
-pub mod glb;
 mod pointer;
 mod read;
 pub mod splice;
-pub mod uri;
 mod write;
 
 pub use atlas::Channel;
 pub use read::{ModelRectangle, read, read_plane_file};
 pub use write::{AssetRequest, Written, WrittenAtlas, check_input, check_outputs, write};
 
+use crate::gltf_file::Invalid;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use shadowfit_solver::{
     mesh::Frame,
     plane::{BakedPlane, OccluderTexture, ShadowPlane, Side},
 };
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Name of the glTF extension. Listed in `extensionsUsed`, never in `extensionsRequired`.
 pub const EXTENSION: &str = "SHADOWFIT_node_shadow_planes";
@@ -278,6 +277,12 @@ pub enum AssetError {
 }
 
 impl AssetError {
+    /// A fault of the file at `path`.
+    fn invalid(path: &Path, Invalid { pointer, reason: why }: Invalid) -> Self {
+        let path = path.into();
+        if pointer.is_empty() { Self::Malformed { path, why } } else { Self::Invalid { path, pointer, why } }
+    }
+
     /// The program's exit code: 2 input or output, 3 invalid input, 4 a fault of the planes, not of the files.
     #[must_use]
     pub fn exit_code(&self) -> u8 {

@@ -2,7 +2,8 @@
 
 use crate::{
     asset::{self, AssetError},
-    pipeline::{self, Effort, FitError, FitRequest},
+    effort::Effort,
+    pipeline::{self, FitError, FitRequest},
     render::{Antialias, Camera, FrameOptions, FrameRequest, Light, Mode, RenderError, cpu, gpu::Gpu, turntable},
     scene,
     validation::ValidationOptions,

@@ -3,6 +3,8 @@
 
 pub mod asset;
 pub mod cli;
+pub mod effort;
+pub mod gltf_file;
 pub mod pipeline;
 pub mod render;
 pub mod report;

@@ -2,10 +2,11 @@
 
 use crate::{
     asset::{self, AssetError, AssetRequest, Bounds},
+    effort::Effort,
     render::RenderError,
     report::{CurvePoint, Lookups, Report, SCHEMA, Times},
     scene::{self, Scene, SceneError, Skipped},
-    validation::{ValidationOptions, validate},
+    validation::{ImageErrors, ValidationOptions, validate},
 };
 use glam::{DVec3, Vec3};
 use shadowfit_solver::{
@@ -21,32 +22,13 @@ use shadowfit_solver::{
     selection::{SelectionOptions, Verdict, select},
     shade::plane_rows,
     visibility::{Pairs, trace},
-    votes::{Mask, thinned},
+    votes::Mask,
 };
 use std::{
     io::Cursor,
     path::{Path, PathBuf},
     time::Instant,
 };
-
-/// How much work a fit does.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Effort {
-    /// Receivers that decide planes and textures.
-    pub receivers: usize,
-    /// Light directions that decide planes and textures; memory is about 9 bytes x receivers x lights.
-    pub lights: usize,
-    /// Blocked pairs that the search uses at most; the textures are decided by all of them.
-    pub search_blocked: usize,
-    /// Lit pairs that the search uses at most.
-    pub search_lit: usize,
-    /// Where the search starts.
-    pub candidates: CandidateOptions,
-    /// How it goes on.
-    pub selection: SelectionOptions,
-    /// Texels along the longer side of each plane, where the user names none.
-    pub texture_size: usize,
-}
 
 /// Rays that estimate a receiver's exposure: in training, and on held-out receivers.
 const EXPOSURE_RAYS: [usize; 2] = [32, 64];
@@ -74,61 +56,6 @@ enum Purpose {
     HeldOut,
     Judging,
     Image,
-}
-
-impl Effort {
-    /// A first look: about five seconds for a model of some thousand triangles on two cores.
-    #[must_use]
-    pub fn fast() -> Self {
-        let base = Self::balanced();
-        Self {
-            receivers: 24_576,
-            lights: 160,
-            search_blocked: 60_000,
-            search_lit: 120_000,
-            selection: SelectionOptions { texels: 64, finalists: 24, refined: 3, replace_rounds: 0, ..base.selection },
-            texture_size: 128,
-            ..base
-        }
-    }
-
-    /// The default.
-    #[must_use]
-    pub fn balanced() -> Self {
-        Self {
-            receivers: 65_536,
-            lights: 256,
-            search_blocked: 150_000,
-            search_lit: 250_000,
-            candidates: CandidateOptions { directions: 150, offsets: 12, surface_points: 400, seed: 0 },
-            selection: SelectionOptions {
-                max_planes: 12,
-                min_gain: 0.005,
-                texels: 96,
-                screening_pairs: 20_000,
-                finalists: 48,
-                refined: 4,
-                refine_steps: 5,
-                replace_rounds: 1,
-            },
-            texture_size: 256,
-        }
-    }
-
-    /// When it may take minutes.
-    #[must_use]
-    pub fn best() -> Self {
-        let base = Self::balanced();
-        Self {
-            receivers: 98_304,
-            lights: 384,
-            search_blocked: 400_000,
-            search_lit: 600_000,
-            candidates: CandidateOptions { directions: 300, offsets: 20, surface_points: 1000, ..base.candidates },
-            selection: SelectionOptions { refined: 8, refine_steps: 6, replace_rounds: 4, ..base.selection },
-            ..base
-        }
-    }
 }
 
 /// One fit.
@@ -227,11 +154,7 @@ struct Fitted {
 pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Report, FitError> {
     let (start, mut clock, mut time_s) = (Instant::now(), Clock(Instant::now()), Times::default());
     progress(format!("reading {}", request.model.display()));
-    asset::check_input(&request.model)?;
-    let stem = stem_of(&request.model);
-    let inputs: Vec<&Path> =
-        [Some(&request.model), request.planes.as_ref()].into_iter().flatten().map(|p| &**p).collect();
-    asset::check_outputs(&request.out_dir, &stem, &inputs)?;
+    check_files(request)?;
     let scene = scene::load(&request.model)?;
     time_s.load = clock.lap();
     let mesh_error = |source| FitError::Mesh { path: request.model.clone(), source };
@@ -249,6 +172,7 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
     let fitted = fit(request, &mesh, &pairs, progress, (&mut clock, &mut time_s))?;
 
     progress("writing the asset".to_string());
+    let stem = stem_of(&request.model);
     let (out_dir, bounds) = (request.out_dir.as_path(), receiver_bounds(&mesh, &receivers));
     let asset_request = AssetRequest {
         input: &request.model,
@@ -262,18 +186,7 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
     time_s.write = clock.lap();
 
     progress("validating what was written".to_string());
-    let planes = asset::read(&written.model)?.in_unit_space(&mesh.frame);
-    let held_out_pairs = held_out(&mesh, request, HELD_OUT, Purpose::HeldOut);
-    let held_out = measure(&planes, &held_out_pairs);
-    let (image, picture) = match &request.validation {
-        Some(options) => {
-            let lights = validation_lights(request, &held_out, options.lights);
-            let validation = validate((&scene, &mesh), &planes, &lights, options)?;
-            (Some(validation.errors), Some(validation.comparison))
-        }
-        None => (None, None),
-    };
-    let curve = curve(&fitted, &held_out_pairs, (planes.len(), &held_out), time_s.search);
+    let proof = prove(request, (&scene, &mesh), &fitted, &written.model, time_s.search)?;
     time_s.validate = clock.lap();
     time_s.total = start.elapsed().as_secs_f64();
 
@@ -286,15 +199,15 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
         triangles: mesh.triangle_count(),
         seed: request.seed,
         light_domain: request.domain_text.clone(),
-        planes: planes.len(),
+        planes: fitted.planes.len(),
         sections: 1,
-        lookups: lookups(&planes, &held_out_pairs),
+        lookups: proof.lookups,
         texture_bytes: written.texture_bytes,
-        held_out,
+        held_out: proof.held_out,
         training: measure(&fitted.planes, &pairs),
-        image,
+        image: proof.image,
         certificate: None,
-        curve,
+        curve: proof.curve,
         time_s,
         peak_memory_bytes: peak_memory_bytes(),
         skipped: skipped(&scene, &mesh, &written.not_copied),
@@ -302,8 +215,45 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
         command: request.command.clone(),
         files: files.iter().map(|path| path.display().to_string()).collect(),
     };
-    write_report(&mut report, out_dir, &stem, picture)?;
+    write_report(&mut report, out_dir, &stem, proof.picture)?;
     Ok(report)
+}
+
+/// Refuses, before the long search, an input that cannot be extended and an output in the place of an input.
+fn check_files(request: &FitRequest) -> Result<(), AssetError> {
+    asset::check_input(&request.model)?;
+    let inputs: Vec<&Path> = std::iter::once(&request.model).chain(&request.planes).map(PathBuf::as_path).collect();
+    asset::check_outputs(&request.out_dir, &stem_of(&request.model), &inputs)
+}
+
+/// What the written files are worth.
+struct Proof {
+    held_out: Metrics,
+    lookups: Lookups,
+    curve: Vec<CurvePoint>,
+    image: Option<ImageErrors>,
+    picture: Option<image::RgbaImage>,
+}
+
+/// Reads the asset back and measures it on pairs and frames that the search never saw.
+fn prove(
+    request: &FitRequest,
+    (scene, mesh): (&Scene, &Mesh),
+    fitted: &Fitted,
+    written: &Path,
+    search_s: f64,
+) -> Result<Proof, FitError> {
+    let planes = asset::read(written)?.in_unit_space(&mesh.frame);
+    let pairs = held_out(mesh, request, HELD_OUT, Purpose::HeldOut);
+    let held_out = measure(&planes, &pairs);
+    let curve = curve(fitted, &pairs, (planes.len(), &held_out), search_s);
+    let mut proof = Proof { held_out, lookups: lookups(&planes, &pairs), curve, image: None, picture: None };
+    if let Some(options) = &request.validation {
+        let lights = validation_lights(request, &held_out, options.lights);
+        let validation = validate((scene, mesh), &planes, &lights, options)?;
+        (proof.image, proof.picture) = (Some(validation.errors), Some(validation.comparison));
+    }
+    Ok(proof)
 }
 
 /// Searches planes, or takes those of a file, and bakes them.
@@ -328,10 +278,9 @@ fn fit(
     }
     let selection = selection_options(request);
     let candidates = generate(mesh, &CandidateOptions { seed: request.seed, ..request.effort.candidates });
-    let sample = thinned(pairs, request.effort.search_blocked, request.effort.search_lit);
     let judging = request.max_error.map(|target| (target, held_out(mesh, request, JUDGING, Purpose::Judging)));
     let (start, mut found_at_s) = (Instant::now(), Vec::new());
-    let selected = select(mesh, &sample, &candidates, &selection, &mut |planes| {
+    let selected = select(mesh, pairs, &candidates, &selection, &mut |planes| {
         progress(format!("searching: {} planes", planes.len()));
         found_at_s.push(start.elapsed().as_secs_f64());
         match &judging {

@@ -9,6 +9,9 @@
 //! sizes. Not guaranteed: that a file with rules broken which concern no triangle (animations, cameras, unused
 //! records) is refused; it is read.
 //!
+//! The JSON is decoded here and not by the `gltf` crate (see `document`), whose enumerations are used; the
+//! container is that of [`gltf_file`].
+//!
 //! ```no_run
 //! let scene = shadowfit::scene::load(std::path::Path::new("teapot.glb"))?;
 //! println!("{} triangles", scene.soup.corners_model.len());
@@ -17,9 +20,9 @@
 
 mod accessor;
 mod assembly;
+mod buffers;
 mod document;
 mod extensions;
-mod files;
 mod materials;
 mod nodes;
 mod primitive;
@@ -28,7 +31,8 @@ pub use assembly::{MAX_DRAWS, MAX_TRIANGLES};
 pub use materials::{MAX_IMAGE_TEXELS, MAX_TEXELS};
 pub use primitive::MAX_COORDINATE;
 
-use glam::{Vec2, Vec3};
+use crate::gltf_file::{self, GltfFile, Invalid};
+use glam::{DAffine3, Vec2, Vec3};
 use serde::Serialize;
 use shadowfit_solver::mesh::Soup;
 use std::{
@@ -140,32 +144,35 @@ fn at(pointer: &str) -> String {
 /// A file that cannot be read, that is invalid (no triangles counts as invalid), or that needs an unsupported
 /// feature.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
-    let model = files::ModelFile::open(path)?;
-    read(&model).map_err(|fault| fault.at(path))
+    let bytes = gltf_file::read_file(path).map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
+    read(path, &bytes).map_err(|fault| fault.at(path))
 }
 
 /// The recipe of [`load`].
-fn read(model: &files::ModelFile) -> Result<Scene, Fault> {
-    let document = document::Document::parse(model.json())?;
+fn read(path: &Path, bytes: &[u8]) -> Result<Scene, Fault> {
+    let file = GltfFile::new(path, bytes)?;
+    file.check_version()?;
+    let document = document::Document::parse(file.root())?;
     let mut notices = Notices::default();
     extensions::check(&document, &mut notices)?;
     let hierarchy = nodes::Hierarchy::new(&document)?;
-    let buffers = files::Buffers::load(model, &document)?;
+    let buffers = buffers::Buffers::load(&file, &document)?;
     let data = accessor::Data { document: &document, buffers: &buffers };
-    let mut scene = assembly::assemble(model, &data, &hierarchy, &mut notices)?;
+    let mut scene = assembly::assemble(&file, &data, &hierarchy, &mut notices)?;
     scene.skipped = notices.list;
     Ok(scene)
 }
 
-/// The external buffers and images that a file names: relative paths with `/` between the parts,
-/// percent-decoded, in the order of the file, each once. Whether they exist is not checked.
+/// Model space from the space of each node of a glTF file.
 ///
 /// # Errors
-/// A file that cannot be read or parsed, or a URI that leads out of the model's folder.
-pub fn external_files(path: &Path) -> Result<Vec<String>, SceneError> {
-    let model = files::ModelFile::open(path)?;
-    let paths = document::Document::parse(model.json()).and_then(|document| files::external_paths(&document));
-    paths.map_err(|fault| fault.at(path))
+/// A record of the wrong shape, a hierarchy that is not a forest, or a transform that is not finite and affine.
+pub(crate) fn node_transforms(file: &GltfFile<'_>) -> Result<Vec<DAffine3>, Invalid> {
+    let hierarchy = document::Document::parse(file.root()).and_then(|document| nodes::Hierarchy::new(&document));
+    hierarchy.map(|hierarchy| hierarchy.model_from_node).map_err(|fault| match fault {
+        Fault::Invalid { pointer, reason } => Invalid { pointer, reason },
+        Fault::Unsupported { .. } => Invalid { pointer: String::new(), reason: fault.to_string() },
+    })
 }
 
 /// An error that does not know its file yet.
@@ -197,6 +204,12 @@ impl Fault {
             Self::Invalid { pointer, reason } => SceneError::Invalid { path, pointer, reason },
             Self::Unsupported { features, remedy } => SceneError::Unsupported { path, features, remedy },
         }
+    }
+}
+
+impl From<Invalid> for Fault {
+    fn from(Invalid { pointer, reason }: Invalid) -> Self {
+        Self::Invalid { pointer, reason }
     }
 }
 

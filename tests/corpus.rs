@@ -8,7 +8,7 @@
 #[allow(dead_code, reason = "each test binary uses its part")]
 mod fits;
 
-use shadowfit::pipeline::Effort;
+use shadowfit::effort::Effort;
 use std::{
     collections::BTreeMap,
     fs,

@@ -6,7 +6,7 @@
 mod fits;
 
 use fits::{FitRequest, fit, model, request};
-use shadowfit::{pipeline::Effort, report::Report};
+use shadowfit::{effort::Effort, report::Report};
 
 /// The report of a fit of `models/NAME.glb`, changed by `with`.
 fn report(name: &str, effort: Effort, with: impl FnOnce(FitRequest) -> FitRequest) -> Report {

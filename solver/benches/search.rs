@@ -14,7 +14,7 @@ use shadowfit_solver::{
     lights::LightDomain,
     mesh::{Mesh, Sides},
     plane::ShadowPlane,
-    selection::select,
+    selection::{Verdict, select},
     visibility::trace,
     votes::score,
 };
@@ -63,7 +63,7 @@ fn whole_fits(c: &mut Criterion) {
         let pairs = pairs(&mesh, &SAMPLING);
         let candidates = generate(&mesh, &options.candidates);
         group.bench_function(format!("select 4, {name}"), |b| {
-            b.iter(|| select(&mesh, &pairs, black_box(&candidates), &options.selection, &mut |_| {}));
+            b.iter(|| select(&mesh, &pairs, black_box(&candidates), &options.selection, &mut |_| Verdict::Continue));
         });
         let (selection, _) = fit(&mesh, &pairs, &options);
         group.bench_function(format!("bake 4, {name}"), |b| {

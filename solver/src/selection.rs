@@ -11,12 +11,12 @@
 use crate::{
     candidates::Candidate,
     mesh::Mesh,
-    plane::{ShadowPlane, Side},
+    plane::ShadowPlane,
     rectangle::{Turn, around_section, tighten},
     visibility::Pairs,
-    votes::{Mask, Score, best_mask, score, thinned, uncovered},
+    votes::{Mask, best_mask, score, thinned, uncovered},
 };
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
 /// How hard to search.
@@ -27,6 +27,8 @@ pub struct SelectionOptions {
     /// A plane must lower `shadow_error` by at least this. 0.02 and up leaves visible shadows out; below 0.002 the
     /// search picks noise.
     pub min_gain: f64,
+    /// Blocked pairs that planes are scored on, and lit ones. All pairs where fewer are left.
+    pub scoring_pairs: [usize; 2],
     /// Texels a side of the textures that the search itself uses. 32 to 128; the cost does not depend on it, but
     /// with few pairs per texel gains get noisy.
     pub texels: usize,
@@ -36,6 +38,8 @@ pub struct SelectionOptions {
     pub finalists: usize,
     /// Finalists that are refined.
     pub refined: usize,
+    /// Refined planes that are polished as rectangles.
+    pub polished: usize,
     /// Halvings of the refinement's step: precision 2^-n of a candidate spacing.
     pub refine_steps: usize,
     /// Replace rounds; each costs about as much as the greedy search.
@@ -74,16 +78,17 @@ const BATCH: usize = 64;
 /// Texels a side while screening: the sample has few pairs per texel.
 const SCREENING_TEXELS: usize = 32;
 
-/// First tilt of the refinement in radians and first shift in unit space: about the spacing of the candidates.
+/// First tilt of the refinement, radians: about the spacing of the candidates.
 const FIRST_TILT: f32 = 0.12;
-const FIRST_SHIFT: f32 = 0.06;
 
-/// A plane by three numbers: what the refinement moves.
-#[derive(Clone, Copy)]
-struct Pose {
-    normal: Vec3,
-    offset: f32,
-}
+/// Shift in unit space that goes with a tilt of one radian: moves the rim of a plane about as far as the tilt does.
+const SHIFT_PER_TILT: f32 = 0.5;
+
+/// Rectangles are polished with this share of their size added at each side, so that they can grow.
+const POLISH_ROOM: f32 = 0.15;
+
+/// First step of the polish relative to the refinement's: it starts where that has settled.
+const POLISH_STEP: f32 = 0.5;
 
 /// Everything a search needs, borrowed.
 struct Search<'a> {
@@ -160,7 +165,7 @@ impl Search<'_> {
             let open = uncovered(self.pairs, &others);
             let mut bounds = vec![f64::INFINITY; self.candidates.len()];
             let kept = score(&open, &planes[k].plane, self.options.texels);
-            let found = self.best_plane(&open, &mut bounds, Some(pose_of(&planes[k].plane)));
+            let found = self.best_plane(&open, &mut bounds, Some(&planes[k].plane));
             planes[k] = match found {
                 Some((gain, mask)) if gain > kept.gain * (1.0 + REPLACE_MARGIN) => {
                     exchanges += 1;
@@ -212,19 +217,34 @@ impl Search<'_> {
     }
 
     /// The best plane for pairs that nothing covers. `bounds` holds each candidate's last screening gain (a lazy
-    /// upper bound); `start` is one more pose to refine.
-    fn best_plane(&self, open: &Pairs, bounds: &mut [f64], start: Option<Pose>) -> Option<(f64, Mask)> {
-        let sample = thinned(open, self.options.screening_pairs, 2 * self.options.screening_pairs);
-        let mut poses: Vec<Pose> =
-            self.screen(&sample, bounds).into_iter().map(|i| pose(&self.candidates[i])).collect();
-        poses.extend(start);
-        // Score the finalists on all pairs and refine the best of them.
-        let mut scored: Vec<(f64, Pose)> = poses.par_iter().map(|p| (self.score(open, *p).gain, *p)).collect();
+    /// upper bound); `start` is one more rectangle to improve.
+    fn best_plane(&self, open: &Pairs, bounds: &mut [f64], start: Option<&ShadowPlane>) -> Option<(f64, Mask)> {
+        let [blocked, lit] = self.options.scoring_pairs;
+        let open = &thinned(open, blocked, lit);
+        let screened =
+            self.screen(&thinned(open, self.options.screening_pairs, 2 * self.options.screening_pairs), bounds);
+        // Score the finalists on all pairs; refine the best, first as unbounded planes, then as rectangles.
+        let wide = |i: &usize| {
+            let candidate = &self.candidates[*i];
+            let plane = self.around(candidate.normal, candidate.offset)?;
+            Some((score(open, &plane, self.options.texels).gain, plane))
+        };
+        let mut scored: Vec<(f64, ShadowPlane)> = screened.par_iter().filter_map(wide).collect();
         scored.sort_by(|a, b| b.0.total_cmp(&a.0));
         scored.truncate(self.options.refined);
-        let refined: Vec<(f64, Pose)> = scored.par_iter().map(|(gain, p)| self.refine(open, *gain, *p)).collect();
-        let (_, best) = refined.into_iter().reduce(|a, b| if b.0 > a.0 { b } else { a })?;
-        self.finish(open, best)
+        let refined = scored.par_iter().map(|(gain, plane)| {
+            self.compass(open, *gain, *plane, FIRST_TILT, |moved| {
+                self.around(moved.normal(), moved.normal().dot(moved.origin))
+            })
+        });
+        let mut refined: Vec<(f64, ShadowPlane)> = refined.collect();
+        refined.sort_by(|a, b| b.0.total_cmp(&a.0));
+        refined.truncate(self.options.polished);
+        let rectangles: Vec<ShadowPlane> =
+            refined.par_iter().filter_map(|(_, plane)| self.tight(open, plane)).collect();
+        let rectangles: Vec<ShadowPlane> = rectangles.into_iter().chain(start.copied()).collect();
+        let polished: Vec<(f64, Mask)> = rectangles.par_iter().filter_map(|plane| self.polish(open, plane)).collect();
+        polished.into_iter().reduce(|a, b| if b.0 > a.0 { b } else { a })
     }
 
     /// Indices of the best candidates on a sample, best first.
@@ -250,63 +270,82 @@ impl Search<'_> {
     }
 
     fn screening_gain(&self, sample: &Pairs, candidate: usize) -> f64 {
-        let Pose { normal, offset } = pose(&self.candidates[candidate]);
-        around_section(self.low, self.high, normal, offset)
-            .map_or(f64::NEG_INFINITY, |plane| score(sample, &plane, SCREENING_TEXELS).gain)
+        let Candidate { normal, offset, .. } = self.candidates[candidate];
+        let plane = self.around(normal, offset);
+        plane.map_or(f64::NEG_INFINITY, |plane| score(sample, &plane, SCREENING_TEXELS).gain)
     }
 
-    fn score(&self, open: &Pairs, pose: Pose) -> Score {
-        around_section(self.low, self.high, pose.normal, pose.offset)
-            .map_or(Score { gain: f64::NEG_INFINITY, side: Side::Both }, |plane| {
-                score(open, &plane, self.options.texels)
-            })
+    /// The rectangle around the model's section.
+    fn around(&self, normal: Vec3, offset: f32) -> Option<ShadowPlane> {
+        around_section(self.low, self.high, normal, offset)
+    }
+
+    /// The rectangle tight around what the plane blocks.
+    fn tight(&self, open: &Pairs, plane: &ShadowPlane) -> Option<ShadowPlane> {
+        let texels = self.options.texels;
+        tighten(open, &best_mask(open, plane, score(open, plane, texels).side, texels), Turn::Free)
+    }
+
+    /// Moves a rectangle as it is, with some room around it: all texels serve what it blocks, so that small parts
+    /// are seen as sharply as large ones.
+    fn polish(&self, open: &Pairs, plane: &ShadowPlane) -> Option<(f64, Mask)> {
+        let texels = self.options.texels;
+        let roomy = enlarged(plane, POLISH_ROOM);
+        let gain = score(open, &roomy, texels).gain;
+        let (_, moved) = self.compass(open, gain, roomy, FIRST_TILT * POLISH_STEP, Some);
+        let plane = self.tight(open, &moved)?;
+        let tight = score(open, &plane, texels);
+        Some((tight.gain, best_mask(open, &plane, tight.side, texels)))
     }
 
     /// Compass search: try a step each way in both tilts and the offset, keep what gains, else halve the step.
-    fn refine(&self, open: &Pairs, gain: f64, start: Pose) -> (f64, Pose) {
-        let (mut gain, mut at) = (gain, start);
-        let mut scale = 1.0;
+    /// `window` turns a moved rectangle into the one that is scored and kept.
+    fn compass(
+        &self,
+        open: &Pairs,
+        mut gain: f64,
+        mut at: ShadowPlane,
+        first_tilt: f32,
+        window: impl Fn(ShadowPlane) -> Option<ShadowPlane>,
+    ) -> (f64, ShadowPlane) {
+        let mut tilt = first_tilt;
         for _ in 0..self.options.refine_steps {
-            let (t, b) = at.normal.any_orthonormal_pair();
-            for (tilt, shift) in [(t, 0.0), (b, 0.0), (Vec3::ZERO, FIRST_SHIFT)] {
-                for sign in [scale, -scale] {
-                    let normal = (at.normal + tilt * (FIRST_TILT * sign)).normalize();
-                    // Tilt about the foot of the plane, so that it stays where it is.
-                    let offset = at.offset * normal.dot(at.normal) + shift * sign;
-                    let moved = Pose { normal, offset };
-                    let moved_gain = self.score(open, moved).gain;
+            for direction in 0..3 {
+                for step in [tilt, -tilt] {
+                    let Some(moved) = window(shifted(&at, direction, step)) else { continue };
+                    let moved_gain = score(open, &moved, self.options.texels).gain;
                     if moved_gain > gain {
                         (gain, at) = (moved_gain, moved);
                         break;
                     }
                 }
             }
-            scale *= 0.5;
+            tilt *= 0.5;
         }
         (gain, at)
     }
+}
 
-    /// The pose as a rectangle tight around what it blocks, with its texture.
-    fn finish(&self, open: &Pairs, pose: Pose) -> Option<(f64, Mask)> {
-        let texels = self.options.texels;
-        let wide = around_section(self.low, self.high, pose.normal, pose.offset)?;
-        let rough = best_mask(open, &wide, score(open, &wide, texels).side, texels);
-        let plane = tighten(open, &rough, Turn::Free)?;
-        let tight = score(open, &plane, texels);
-        Some((tight.gain, best_mask(open, &plane, tight.side, texels)))
-    }
+/// The rectangle turned about its middle, around its v or u edge, or moved along its normal.
+fn shifted(plane: &ShadowPlane, direction: usize, tilt: f32) -> ShadowPlane {
+    let middle = plane.origin + 0.5 * (plane.u + plane.v);
+    let (axis, shift) = match direction {
+        0 => (plane.u, Vec3::ZERO),
+        1 => (plane.v, Vec3::ZERO),
+        _ => (Vec3::ZERO, plane.normal() * (tilt * SHIFT_PER_TILT)),
+    };
+    let turn = Quat::from_scaled_axis(axis.normalize_or_zero() * tilt);
+    let (u, v) = (turn * plane.u, turn * plane.v);
+    ShadowPlane { origin: middle + shift - 0.5 * (u + v), u, v }
+}
+
+/// The rectangle with `room` (a share of its size) added at each side.
+fn enlarged(plane: &ShadowPlane, room: f32) -> ShadowPlane {
+    let (u, v) = (plane.u * (1.0 + 2.0 * room), plane.v * (1.0 + 2.0 * room));
+    ShadowPlane { origin: plane.origin - room * (plane.u + plane.v), u, v }
 }
 
 /// Index of the smallest number.
 fn least(gains: &[f64]) -> Option<usize> {
     (0..gains.len()).min_by(|&a, &b| gains[a].total_cmp(&gains[b]))
-}
-
-fn pose(candidate: &Candidate) -> Pose {
-    Pose { normal: candidate.normal, offset: candidate.offset }
-}
-
-fn pose_of(plane: &ShadowPlane) -> Pose {
-    let normal = plane.normal();
-    Pose { normal, offset: normal.dot(plane.origin) }
 }

@@ -19,6 +19,8 @@ pub struct LightPairs {
     pub y: Vec<f32>,
     /// As `x`.
     pub z: Vec<f32>,
+    /// Index of the receiver.
+    pub receiver: Vec<u32>,
     /// `+w` where blocked, `-w` where lit; `w = area x exposure x n.l x solid angle`.
     pub vote: Vec<f32>,
     /// Pairs before this index belong to fold 0, those from it on to fold 1 (every other receiver).
@@ -59,26 +61,28 @@ impl LightPairs {
 
     fn with_capacity(light: Vec3, capacity: usize) -> Self {
         let column = || Vec::with_capacity(capacity);
-        Self { light, x: column(), y: column(), z: column(), vote: column(), split: 0 }
+        let receiver = Vec::with_capacity(capacity);
+        Self { light, x: column(), y: column(), z: column(), receiver, vote: column(), split: 0 }
     }
 
-    fn push(&mut self, p: Vec3, vote: f32) {
+    fn push(&mut self, p: Vec3, receiver: u32, vote: f32) {
         self.x.push(p.x);
         self.y.push(p.y);
         self.z.push(p.z);
+        self.receiver.push(receiver);
         self.vote.push(vote);
     }
 
-    /// The pairs for which `keep(index)` is true, in order.
+    /// The pairs for which `vote(index)` gives one, in order, with that vote.
     #[must_use]
-    pub fn filtered(&self, mut keep: impl FnMut(usize) -> bool) -> Self {
+    pub fn revoted(&self, mut vote: impl FnMut(usize) -> Option<f32>) -> Self {
         let mut out = Self::with_capacity(self.light, self.len() / 2);
         for i in 0..self.len() {
             if i == self.split {
                 out.split = out.len();
             }
-            if keep(i) {
-                out.push(self.point(i), self.vote[i]);
+            if let Some(vote) = vote(i) {
+                out.push(self.point(i), self.receiver[i], vote);
             }
         }
         if self.split == self.len() {
@@ -126,7 +130,7 @@ fn trace_light(mesh: &Mesh, receivers: &Receivers, light: Vec3, solid_angle: f32
             }
             let weight = receivers.weights[i] * cosine * solid_angle;
             let blocked = mesh.is_blocked(receivers.origins[i], light);
-            pairs.push(receivers.points[i], if blocked { weight } else { -weight });
+            pairs.push(receivers.points[i], i as u32, if blocked { weight } else { -weight });
         }
     }
     pairs

@@ -128,7 +128,7 @@ fn a_score_is_the_drop_of_the_error_where_both_folds_agree() {
 fn crossings(light: Vec3, pairs: &[(f32, f32)], split: usize) -> LightPairs {
     let (x, vote): (Vec<f32>, Vec<f32>) = pairs.iter().copied().unzip();
     let n = x.len();
-    LightPairs { light, x, y: vec![-0.5 * light.y; n], z: vec![0.0; n], vote, split }
+    LightPairs { light, x, y: vec![-0.5 * light.y; n], z: vec![0.0; n], receiver: vec![0; n], vote, split }
 }
 
 #[test]

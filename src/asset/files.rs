@@ -1,109 +1,23 @@
-//! Files of an asset: which ones a model needs, and writing several of them all or nothing.
+//! Files of an asset: writing several of them all or nothing.
 //!
 //! A [`Batch`] first writes every file under a temporary name (starting with `.`) beside its place and syncs it,
 //! then renames them one after another. An error on the way removes what was made. Guaranteed: no file is ever
 //! seen half written, also after a kill. Not guaranteed: that a kill between two renames leaves a matching set.
 
-use super::{AssetError, uri};
-use serde_json::Value;
+use super::AssetError;
+use crate::gltf_file::{folder_of, read_file};
 use std::{
     fs, io,
-    path::{Component, Path, PathBuf},
+    path::{Path, PathBuf},
 };
 use tempfile::NamedTempFile;
-
-/// A file that a model names by a relative URI.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct External {
-    /// Path below the model's folder.
-    pub relative: PathBuf,
-    /// Where it lies.
-    pub source: PathBuf,
-}
-
-/// What a model needs beside its own file.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Externals {
-    /// Buffers and images that exist, sorted, each once.
-    pub found: Vec<External>,
-    /// URIs of images that do not exist or are no relative paths (`https:`): the output names them as the input
-    /// does.
-    pub not_copied: Vec<String>,
-}
 
 /// Reads a whole file.
 ///
 /// # Errors
 /// It cannot be read.
 pub fn read(path: &Path) -> Result<Vec<u8>, AssetError> {
-    fs::read(path).map_err(|source| AssetError::Io { action: "read", path: path.into(), source })
-}
-
-/// The external files of the glTF document `root` in the file `input`; `data:` URIs are none.
-///
-/// # Errors
-/// A path that leads out of the model's folder; a buffer that does not exist.
-pub fn external_files(input: &Path, root: &Value) -> Result<Externals, AssetError> {
-    let mut externals = Externals::default();
-    for kind in ["buffers", "images"] {
-        let list = root.get(kind).and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
-        for (i, entry) in list.iter().enumerate() {
-            let Some(uri) = entry.get("uri").and_then(Value::as_str).filter(|uri| !uri::is_data(uri)) else { continue };
-            let pointer = || format!("/{kind}/{i}/uri");
-            match locate(input, uri) {
-                Ok(file) if file.source.is_file() => externals.found.push(file),
-                Ok(file) if kind == "buffers" => {
-                    return Err(AssetError::Io {
-                        action: "read",
-                        path: file.source,
-                        source: io::ErrorKind::NotFound.into(),
-                    });
-                }
-                Err(why) if kind == "buffers" || !uri::has_scheme(uri) => {
-                    return Err(AssetError::Invalid { path: input.into(), pointer: pointer(), why });
-                }
-                _ => externals.not_copied.push(uri.to_owned()),
-            }
-        }
-    }
-    externals.found.sort();
-    externals.found.dedup();
-    Ok(externals)
-}
-
-/// The file that a relative URI in the file `document` names, whether it exists or not.
-///
-/// # Errors
-/// Why the URI is no path below the document's folder, also through symbolic links.
-pub fn locate(document: &Path, uri: &str) -> Result<External, String> {
-    if uri::has_scheme(uri) {
-        return Err(format!("{uri:?} is no relative path: put the file beside the model"));
-    }
-    let folder = folder_of(document);
-    let decoded = uri::decode(uri).ok_or_else(|| format!("{uri:?} is not UTF-8 when decoded"))?;
-    // Writers that do not encode may have a "%41" in the name itself.
-    let name = if folder.join(&decoded).exists() { decoded.as_str() } else { uri };
-    let name = if folder.join(name).exists() { name } else { decoded.as_str() };
-    let mut relative = PathBuf::new();
-    for component in Path::new(name).components() {
-        match component {
-            Component::Normal(part) => relative.push(part),
-            Component::CurDir => {}
-            _ => return Err(format!("{uri:?} leads out of the model's folder: put the file below it")),
-        }
-    }
-    let source = folder.join(&relative);
-    if let (Ok(real), Ok(real_folder)) = (source.canonicalize(), folder.canonicalize())
-        && !real.starts_with(&real_folder)
-    {
-        return Err(format!("{uri:?} is a link that leads out of the model's folder: put the file below it"));
-    }
-    Ok(External { relative, source })
-}
-
-/// The folder that holds a file, `.` for a bare name.
-fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+    read_file(path).map_err(|source| AssetError::Io { action: "read", path: path.into(), source })
 }
 
 /// Do two paths lead to one file, also by symbolic or hard links? False where one does not exist.

@@ -1,6 +1,7 @@
 //! A JSON value together with its JSON pointer, so that every complaint says where.
 
 use super::AssetError;
+use crate::gltf_file::Invalid;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::path::Path;
@@ -57,8 +58,7 @@ impl<'a> At<'a> {
 
     /// A complaint about this value.
     pub fn error(&self, why: String) -> AssetError {
-        let pointer = if self.pointer.is_empty() { "/".into() } else { self.pointer.clone() };
-        AssetError::Invalid { path: self.file.into(), pointer, why }
+        AssetError::invalid(self.file, Invalid { pointer: self.pointer.clone(), reason: why })
     }
 
     fn step(&self, step: impl std::fmt::Display, value: &'a Value) -> Self {

@@ -5,10 +5,13 @@
 //! and those of the nodes above it are applied, so that a tool may move the whole model.
 
 use super::{
-    AssetError, Bounds, Channel, EXTENSION, Encoding, ModelPlane, Rectangle, ShadowSet, atlas, files, glb, pointer::At,
-    uri,
+    AssetError, Bounds, Channel, EXTENSION, Encoding, ModelPlane, Rectangle, ShadowSet, atlas, files, pointer::At,
 };
-use glam::{DMat4, DQuat, DVec3};
+use crate::{
+    gltf_file::{GltfFile, UriError},
+    scene,
+};
+use glam::{DAffine3, DVec3};
 use image::{ImageFormat, ImageReader, RgbImage};
 use serde::Deserialize;
 use serde_json::Value;
@@ -22,18 +25,10 @@ use std::{collections::BTreeMap, io::Cursor, path::Path};
 /// wrong, with its JSON pointer.
 pub fn read(path: &Path) -> Result<ShadowSet, AssetError> {
     let bytes = files::read(path)?;
-    let malformed = |why: String| AssetError::Malformed { path: path.into(), why };
-    let (json, bin) = if bytes.starts_with(glb::MAGIC) {
-        let chunks = glb::split(&bytes).map_err(malformed)?;
-        (chunks.json, chunks.bin)
-    } else {
-        let text = std::str::from_utf8(&bytes).map_err(|e| malformed(format!("neither GLB nor UTF-8 text: {e}")))?;
-        (text.trim_start_matches('\u{feff}'), None)
-    };
-    let value: Value = serde_json::from_str(json).map_err(|e| malformed(format!("not JSON: {e}")))?;
-    let root = At::root(path, &value);
-    let mut atlases = Atlases { path, root: root.clone(), bin, decoded: BTreeMap::new() };
-    if value.get("asset").is_none() {
+    let file = GltfFile::new(path, &bytes).map_err(|fault| AssetError::invalid(path, fault))?;
+    let root = At::root(path, file.root());
+    let mut atlases = Atlases { file: &file, root: root.clone(), decoded: BTreeMap::new() };
+    if root.optional("asset").is_none() {
         // The sidecar is already in model space.
         let sets = root.member("sets")?;
         return match sets.elements()?.as_slice() {
@@ -41,10 +36,11 @@ pub fn read(path: &Path) -> Result<ShadowSet, AssetError> {
             others => Err(sets.error(format!("one set expected, found {}", others.len()))),
         };
     }
-    let (index, model_from_frame) = frame_node(&root)?;
+    file.check_version().map_err(|fault| AssetError::invalid(path, fault))?;
+    let (index, model_from_frame) = frame_node(&file, &root)?;
     let sets = root.member("extensions")?.member(EXTENSION)?.member("sets")?.elements()?;
     let mut set = read_set(&index.follow(&sets)?, &mut atlases)?;
-    if model_from_frame != DMat4::IDENTITY {
+    if model_from_frame != DAffine3::IDENTITY {
         set.transform(&model_from_frame);
     }
     Ok(set)
@@ -104,9 +100,8 @@ fn crop(atlas: &RgbImage, region: &At<'_>, channel: Channel) -> Result<OccluderT
 
 /// Pictures of a document, decoded once each.
 struct Atlases<'a> {
-    path: &'a Path,
+    file: &'a GltfFile<'a>,
     root: At<'a>,
-    bin: Option<&'a [u8]>,
     decoded: BTreeMap<String, RgbImage>,
 }
 
@@ -133,11 +128,14 @@ impl Atlases<'_> {
             return self.uri_bytes(&uri);
         }
         let view = image.member("bufferView")?.follow(&self.root.optional_elements("bufferViews")?)?;
-        let buffer = view.member("buffer")?.follow(&self.root.optional_elements("buffers")?)?;
+        let buffer_index = view.member("buffer")?;
+        let buffer = buffer_index.follow(&self.root.optional_elements("buffers")?)?;
+        // The binary chunk stands for buffer 0 only.
+        let bin = if buffer_index.parse::<usize>()? == 0 { self.file.chunks().bin } else { None };
         let offset: usize = view.optional("byteOffset").map_or(Ok(0), |offset| offset.parse())?;
         let length: usize = view.member("byteLength")?.parse()?;
         let loaded;
-        let bytes = match (buffer.optional("uri"), self.bin) {
+        let bytes = match (buffer.optional("uri"), bin) {
             (Some(uri), _) => {
                 loaded = self.uri_bytes(&uri)?;
                 loaded.as_slice()
@@ -153,16 +151,15 @@ impl Atlases<'_> {
     /// Contents of a `data:` URI or of a file below the document's folder.
     fn uri_bytes(&self, at: &At<'_>) -> Result<Vec<u8>, AssetError> {
         let uri: String = at.parse()?;
-        if uri::is_data(&uri) {
-            return uri::data(&uri).ok_or_else(|| at.error("not base64".into()));
-        }
-        let file = files::locate(self.path, &uri).map_err(|why| at.error(why))?;
-        files::read(&file.source)
+        self.file.fetch(&uri).map_err(|error| match error {
+            UriError::Unreadable { file, source } => AssetError::Io { action: "read", path: file.path, source },
+            UriError::Forbidden(why) | UriError::Damaged(why) => at.error(why),
+        })
     }
 }
 
 /// The `set` of the frame node, and the transform from its space to model space.
-fn frame_node<'a>(root: &At<'a>) -> Result<(At<'a>, DMat4), AssetError> {
+fn frame_node<'a>(file: &GltfFile<'_>, root: &At<'a>) -> Result<(At<'a>, DAffine3), AssetError> {
     let nodes = root.optional_elements("nodes")?;
     let label = |node: &At<'a>| node.optional("extensions").and_then(|e| e.optional(EXTENSION));
     let frames: Vec<usize> = (0..nodes.len()).filter(|&i| label(&nodes[i]).is_some()).collect();
@@ -170,51 +167,25 @@ fn frame_node<'a>(root: &At<'a>) -> Result<(At<'a>, DMat4), AssetError> {
         [frame] => (*frame, nodes[*frame].member("extensions")?.member(EXTENSION)?.member("set")?),
         _ => return Err(root.error(format!("{} nodes carry {EXTENSION}, one expected", frames.len()))),
     };
-    let mut parents = vec![None; nodes.len()];
-    for (i, node) in nodes.iter().enumerate() {
-        for child in node.optional_elements("children")? {
-            child.follow(&nodes)?;
-            parents[child.parse::<usize>()?] = Some(i);
-        }
-    }
-    let mut model_from_frame = local_transform(&nodes[frame])?;
-    let mut node = frame;
-    let mut height = 0;
-    while let Some(parent) = parents[node] {
-        height += 1;
-        if height > nodes.len() {
-            return Err(nodes[frame].error("the node is its own ancestor".into()));
-        }
-        model_from_frame = local_transform(&nodes[parent])? * model_from_frame;
-        node = parent;
-    }
-    let determinant = model_from_frame.determinant();
-    if !(model_from_frame.is_finite() && determinant.is_finite() && determinant != 0.0) {
-        return Err(nodes[frame].error("the node's transform has no inverse".into()));
-    }
-    Ok((set, model_from_frame))
-}
-
-/// A node's own transform.
-fn local_transform(node: &At<'_>) -> Result<DMat4, AssetError> {
-    if let Some(matrix) = node.optional("matrix") {
-        return Ok(DMat4::from_cols_array(&matrix.parse()?));
-    }
-    let vector = |key: &str, default| node.optional(key).map_or(Ok(default), |at| at.parse::<DVec3>());
-    let rotation = node.optional("rotation").map_or(Ok(DQuat::IDENTITY), |at| at.parse::<DQuat>())?;
-    let (scale, translation) = (vector("scale", DVec3::ONE)?, vector("translation", DVec3::ZERO)?);
-    Ok(DMat4::from_scale_rotation_translation(scale, rotation.normalize(), translation))
+    let transforms = scene::node_transforms(file).map_err(|fault| AssetError::invalid(file.path(), fault))?;
+    let is_invertible = |transform: &&DAffine3| {
+        let determinant = transform.matrix3.determinant();
+        determinant.is_finite() && determinant != 0.0
+    };
+    let no_inverse = || nodes[frame].error("the node's transform has no inverse".into());
+    let model_from_frame = transforms.get(frame).filter(is_invertible).ok_or_else(no_inverse)?;
+    Ok((set, *model_from_frame))
 }
 
 impl ShadowSet {
     /// Moves the set by an affine transform.
-    fn transform(&mut self, matrix: &DMat4) {
-        let determinant = matrix.determinant();
+    fn transform(&mut self, transform: &DAffine3) {
+        let determinant = transform.matrix3.determinant();
         for plane in &mut self.planes {
             let rectangle = &mut plane.rectangle;
-            rectangle.origin = matrix.transform_point3(rectangle.origin);
-            rectangle.u_axis = matrix.transform_vector3(rectangle.u_axis);
-            rectangle.v_axis = matrix.transform_vector3(rectangle.v_axis);
+            rectangle.origin = transform.transform_point3(rectangle.origin);
+            rectangle.u_axis = transform.transform_vector3(rectangle.u_axis);
+            rectangle.v_axis = transform.transform_vector3(rectangle.v_axis);
             // A bias has no direction: the mean scale is the best there is.
             plane.bias *= determinant.abs().cbrt();
             // A mirror turns u x v to the other side of the plane.
@@ -227,7 +198,7 @@ impl ShadowSet {
         let Bounds { min, max } = self.bounds;
         let corner =
             |i: usize| DVec3::from_array([0, 1, 2].map(|axis| if i >> axis & 1 == 0 { min[axis] } else { max[axis] }));
-        let corners = (0..8).map(|i| matrix.transform_point3(corner(i)));
+        let corners = (0..8).map(|i| transform.transform_point3(corner(i)));
         let (low, high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (min, max) = corners.fold((low, high), |(low, high), p| (low.min(p), high.max(p)));
         self.bounds = Bounds { min, max };
@@ -273,11 +244,11 @@ struct PlaneFileEntry {
 /// The file cannot be read; an unknown member; axes that are parallel.
 pub fn read_plane_file(path: &Path) -> Result<Vec<ModelRectangle>, AssetError> {
     let bytes = files::read(path)?;
-    let malformed = |e: serde_json::Error| AssetError::Malformed { path: path.into(), why: format!("not JSON: {e}") };
-    let root: Value = serde_json::from_slice(&bytes).map_err(malformed)?;
+    let file = GltfFile::new(path, &bytes).map_err(|fault| AssetError::invalid(path, fault))?;
+    let root = At::root(path, file.root());
     // The outer object is checked for unknown members; the planes one by one, so that each is named.
-    let _: PlaneFile = At::root(path, &root).parse()?;
-    let list = At::root(path, &root).member("planes")?.elements()?;
+    let _: PlaneFile = root.parse()?;
+    let list = root.member("planes")?.elements()?;
     let mut rectangles = Vec::with_capacity(list.len());
     for at in list {
         let PlaneFileEntry { name, origin, u_axis, v_axis, side } = at.parse()?;

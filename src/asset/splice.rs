@@ -7,19 +7,10 @@
 //! Positions come from `serde_json`'s raw values: borrowed slices of the text, so that their distance from its
 //! start is their offset. Not guaranteed: that the added members make sense where they are put.
 
+use crate::gltf_file::Invalid;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;
 use std::{fmt, ops::Range};
-
-/// Why a document cannot be edited.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{pointer}: {why}")]
-pub struct SpliceError {
-    /// JSON pointer of the place.
-    pub pointer: String,
-    /// What is wrong there.
-    pub why: String,
-}
 
 /// A value inside a JSON text: its place, not its meaning.
 #[derive(Clone, Debug)]
@@ -57,7 +48,7 @@ impl<'a> Spot<'a> {
     ///
     /// # Errors
     /// Not JSON.
-    pub fn root(text: &'a str) -> Result<Self, SpliceError> {
+    pub fn root(text: &'a str) -> Result<Self, Invalid> {
         let whole = Self { text, span: 0..text.len(), pointer: String::new() };
         let raw: &RawValue = serde_json::from_str(text).map_err(|e| whole.error(e))?;
         whole.child(raw, "")
@@ -79,7 +70,7 @@ impl<'a> Spot<'a> {
     ///
     /// # Errors
     /// The value is no array.
-    pub fn elements(&self) -> Result<Vec<Self>, SpliceError> {
+    pub fn elements(&self) -> Result<Vec<Self>, Invalid> {
         let raw: Vec<&RawValue> = serde_json::from_str(self.slice()).map_err(|e| self.error(e))?;
         raw.into_iter().enumerate().map(|(i, value)| self.child(value, &format!("/{i}"))).collect()
     }
@@ -88,7 +79,7 @@ impl<'a> Spot<'a> {
     ///
     /// # Errors
     /// The value is no object, or a key appears twice (readers disagree about which one counts).
-    pub fn members(&self) -> Result<Vec<(String, Self)>, SpliceError> {
+    pub fn members(&self) -> Result<Vec<(String, Self)>, Invalid> {
         let RawMembers(raw) = serde_json::from_str(self.slice()).map_err(|e| self.error(e))?;
         let mut members: Vec<(String, Self)> = Vec::with_capacity(raw.len());
         for (key, value) in raw {
@@ -105,12 +96,12 @@ impl<'a> Spot<'a> {
     ///
     /// # Errors
     /// As [`Spot::members`].
-    pub fn member(&self, key: &str) -> Result<Option<Self>, SpliceError> {
+    pub fn member(&self, key: &str) -> Result<Option<Self>, Invalid> {
         Ok(self.members()?.into_iter().find_map(|(k, spot)| (k == key).then_some(spot)))
     }
 
     /// A raw value inside this one: the distance of the two slices is its offset.
-    fn child(&self, raw: &RawValue, step: &str) -> Result<Self, SpliceError> {
+    fn child(&self, raw: &RawValue, step: &str) -> Result<Self, Invalid> {
         let start = (raw.get().as_ptr() as usize).wrapping_sub(self.text.as_ptr() as usize);
         let span = start..start.wrapping_add(raw.get().len());
         if self.text.get(span.clone()) != Some(raw.get()) {
@@ -119,9 +110,8 @@ impl<'a> Spot<'a> {
         Ok(Self { text: self.text, span, pointer: format!("{}{step}", self.pointer) })
     }
 
-    fn error(&self, why: impl ToString) -> SpliceError {
-        let pointer = if self.pointer.is_empty() { "/" } else { &self.pointer };
-        SpliceError { pointer: pointer.to_owned(), why: why.to_string() }
+    fn error(&self, reason: impl ToString) -> Invalid {
+        Invalid { pointer: self.pointer.clone(), reason: reason.to_string() }
     }
 }
 
@@ -141,7 +131,7 @@ impl Edits {
     ///
     /// # Errors
     /// The value is no array.
-    pub fn append(&mut self, array: &Spot<'_>, elements: &[String]) -> Result<(), SpliceError> {
+    pub fn append(&mut self, array: &Spot<'_>, elements: &[String]) -> Result<(), Invalid> {
         let last = array.elements()?.pop();
         self.insert(array, last, elements.join(","));
         Ok(())
@@ -151,7 +141,7 @@ impl Edits {
     ///
     /// # Errors
     /// The value is no object.
-    pub fn add_members(&mut self, object: &Spot<'_>, members: &[(&str, String)]) -> Result<(), SpliceError> {
+    pub fn add_members(&mut self, object: &Spot<'_>, members: &[(&str, String)]) -> Result<(), Invalid> {
         let last = object.members()?.pop().map(|(_, spot)| spot);
         // Debug of a str is its JSON spelling for the ASCII keys that glTF and this program use.
         let texts: Vec<String> = members.iter().map(|(key, value)| format!("{key:?}:{value}")).collect();
@@ -214,7 +204,7 @@ mod tests {
         assert!(Spot::root("{").is_err());
         let twice = Spot::root("{\"a\":{\"b\":1,\"\\u0062\":2}}").unwrap().member("a").unwrap().unwrap();
         let error = twice.members().unwrap_err();
-        assert_eq!((error.pointer.as_str(), error.why.as_str()), ("/a", "the key \"b\" appears twice"));
+        assert_eq!((error.pointer.as_str(), error.reason.as_str()), ("/a", "the key \"b\" appears twice"));
         assert!(twice.elements().is_err());
     }
 }

@@ -8,18 +8,22 @@
 use super::{
     AssetError, Bounds, EXTENSION, Encoding, Extension, PlaneEntry, PlaneSet, Rectangle, TextureRef,
     atlas::{self, Atlas, Layout},
-    files::{self, Batch, Externals},
-    glb::{self, Chunks},
-    splice::{Edits, SpliceError, Spot},
+    files::{self, Batch},
+    splice::{Edits, Spot},
+};
+use crate::gltf_file::{
+    External, GltfFile, Invalid, Kind,
+    container::{self, Chunks},
     uri,
 };
+use gltf::json::texture::{MagFilter, MinFilter, WrappingMode};
 use serde_json::{Value, json};
 use shadowfit_solver::{
     mesh::Frame,
     plane::{BakedPlane, OccluderTexture},
 };
 use std::{
-    fmt,
+    fmt, io,
     path::{Path, PathBuf},
 };
 
@@ -64,7 +68,7 @@ pub struct Written {
     pub atlases: Vec<WrittenAtlas>,
     /// Files of the model that lie beside the output now.
     pub copied: Vec<PathBuf>,
-    /// URIs of images that the model names and that were not there to be copied.
+    /// Paths and URIs of images that the model names and that were not there to be copied.
     pub not_copied: Vec<String>,
     /// Number of planes.
     pub planes: usize,
@@ -107,12 +111,12 @@ pub fn write(request: &AssetRequest<'_>) -> Result<Written, AssetError> {
     let sidecar = extension(request, &layout, |i| TextureRef::Uri(pictures[i].uri.clone()))?;
     let sidecar = format!("{:#}\n", json!(sidecar));
 
-    let externals = files::external_files(request.input, &source.root)?;
+    let (externals, not_copied) = source.externals()?;
     let atlas_paths: Vec<PathBuf> = (0..atlases.len()).map(|i| outputs.atlas(i)).collect();
     outputs.refuse_overwriting(request.input, &externals, &atlas_paths)?;
     let mut batch = Batch::default();
-    for external in &externals.found {
-        batch.stage_copy(&external.source, &outputs.folder.join(&external.relative))?;
+    for external in &externals {
+        batch.stage_copy(&external.path, &outputs.folder.join(&external.relative))?;
     }
     for (path, atlas) in atlas_paths.iter().zip(&atlases) {
         batch.stage(path, &atlas.png)?;
@@ -131,8 +135,8 @@ pub fn write(request: &AssetRequest<'_>) -> Result<Written, AssetError> {
         model: outputs.model(),
         sidecar: outputs.sidecar(),
         atlases: atlases.collect(),
-        copied: externals.found.iter().map(|external| outputs.folder.join(&external.relative)).collect(),
-        not_copied: externals.not_copied,
+        copied: externals.iter().map(|external| outputs.folder.join(&external.relative)).collect(),
+        not_copied,
         planes: request.planes.len(),
         texture_bytes: layout.texture_bytes(),
     })
@@ -145,7 +149,7 @@ pub fn write(request: &AssetRequest<'_>) -> Result<Written, AssetError> {
 pub fn check_input(input: &Path) -> Result<(), AssetError> {
     let bytes = files::read(input)?;
     let source = Source::new(input, &bytes)?;
-    files::external_files(input, &source.root)?;
+    source.externals()?;
     source.extended(&[], |_| Ok(Extension { sets: Vec::new() }))?;
     Ok(())
 }
@@ -199,10 +203,10 @@ impl<'a> Outputs<'a> {
     }
 
     /// No output may be a file of the input, nor take the place of a copy of one.
-    fn refuse_overwriting(&self, input: &Path, externals: &Externals, atlases: &[PathBuf]) -> Result<(), AssetError> {
+    fn refuse_overwriting(&self, input: &Path, externals: &[External], atlases: &[PathBuf]) -> Result<(), AssetError> {
         for path in self.but_atlases().iter().chain(atlases) {
-            let is_copy = externals.found.iter().any(|external| self.folder.join(&external.relative) == *path);
-            let is_source = externals.found.iter().any(|external| files::is_same_file(path, &external.source));
+            let is_copy = externals.iter().any(|external| self.folder.join(&external.relative) == *path);
+            let is_source = externals.iter().any(|external| files::is_same_file(path, &external.path));
             if is_copy || is_source || files::is_same_file(path, input) {
                 return Err(AssetError::OverwritesInput { path: path.clone() });
             }
@@ -267,30 +271,40 @@ fn extension(
 
 /// The input model, opened and checked.
 struct Source<'a> {
-    path: &'a Path,
-    chunks: Chunks<'a>,
-    root: Value,
+    file: GltfFile<'a>,
 }
 
 impl<'a> Source<'a> {
     fn new(path: &'a Path, bytes: &'a [u8]) -> Result<Self, AssetError> {
-        let malformed = |why: String| AssetError::Malformed { path: path.into(), why };
-        let chunks = if bytes.starts_with(glb::MAGIC) {
-            glb::split(bytes).map_err(malformed)?
-        } else {
-            let json = std::str::from_utf8(bytes).map_err(|e| malformed(format!("neither GLB nor UTF-8 text: {e}")))?;
-            Chunks { json: json.trim_start_matches('\u{feff}'), bin: None, others: Vec::new() }
+        let open = || {
+            let file = GltfFile::new(path, bytes)?;
+            file.check_version()?;
+            Ok(file)
         };
-        let root: Value = serde_json::from_str(chunks.json).map_err(|e| malformed(format!("not JSON: {e}")))?;
-        let version = root.pointer("/asset/version").and_then(Value::as_str);
-        if !version.is_some_and(|version| version.starts_with("2.")) {
-            let why = "not glTF 2.0: convert it with gltf-pipeline".into();
-            return Err(AssetError::Invalid { path: path.into(), pointer: "/asset/version".into(), why });
-        }
-        if let Some(pointer) = fitted_already(&root) {
+        let file = open().map_err(|fault| AssetError::invalid(path, fault))?;
+        if let Some(pointer) = fitted_already(file.root()) {
             return Err(AssetError::AlreadyFitted { path: path.into(), pointer });
         }
-        Ok(Self { path, chunks, root })
+        Ok(Self { file })
+    }
+
+    /// The files to be copied beside the output, and the URIs of images that are not there to be copied: the
+    /// output names them as the input does.
+    fn externals(&self) -> Result<(Vec<External>, Vec<String>), AssetError> {
+        let externals = self.file.externals().map_err(|fault| AssetError::invalid(self.file.path(), fault))?;
+        let (mut found, mut not_copied) = (Vec::new(), Vec::new());
+        for (external, kind) in externals.files {
+            if external.path.is_file() {
+                found.push(external);
+            } else if kind == Kind::Image {
+                not_copied.push(external.relative);
+            } else {
+                let source = io::ErrorKind::NotFound.into();
+                return Err(AssetError::Io { action: "read", path: external.path, source });
+            }
+        }
+        not_copied.extend(externals.elsewhere);
+        Ok((found, not_copied))
     }
 
     /// The output GLB. `set` makes the extension's root object from the index of the first atlas texture.
@@ -299,20 +313,20 @@ impl<'a> Source<'a> {
         pictures: &[Picture<'_>],
         set: impl FnOnce(usize) -> Result<Extension, AssetError>,
     ) -> Result<Vec<u8>, AssetError> {
-        let place = |e: SpliceError| AssetError::Invalid { path: self.path.into(), pointer: e.pointer, why: e.why };
-        let set = set(self.root.get("textures").and_then(Value::as_array).map_or(0, Vec::len))?;
+        let place = |fault| AssetError::invalid(self.file.path(), fault);
+        let set = set(self.file.root().get("textures").and_then(Value::as_array).map_or(0, Vec::len))?;
         // Pictures go behind the binary chunk where buffer 0 is that chunk.
-        let has_own_buffer = self.root.pointer("/buffers/0").is_some_and(|buffer| buffer.get("uri").is_none());
-        let mut bin = self.chunks.bin.map(<[u8]>::to_vec);
+        let has_own_buffer = self.file.root().pointer("/buffers/0").is_some_and(|buffer| buffer.get("uri").is_none());
+        let mut bin = self.file.chunks().bin.map(<[u8]>::to_vec);
         let mut offsets = None;
         if let (Some(bin), true, false) = (&mut bin, has_own_buffer, pictures.is_empty()) {
             offsets = Some(append(bin, pictures));
         }
         let buffer_end = bin.as_ref().map_or(0, Vec::len);
-        let json =
-            spliced(self.chunks.json, &json!(set), &Pictures { pictures, offsets, buffer_end }).map_err(place)?;
-        let chunks = Chunks { json: &json, bin: bin.as_deref(), others: self.chunks.others.clone() };
-        glb::join(&chunks).map_err(|why| AssetError::Malformed { path: self.path.into(), why })
+        let json = spliced(self.file.chunks().json, &json!(set), &Pictures { pictures, offsets, buffer_end })
+            .map_err(place)?;
+        let chunks = Chunks { json: &json, bin: bin.as_deref(), others: self.file.chunks().others.clone() };
+        container::join(&chunks).map_err(|why| AssetError::Malformed { path: self.file.path().into(), why })
     }
 }
 
@@ -358,7 +372,7 @@ struct Pictures<'a> {
 }
 
 /// The document with the frame node, the atlases and the extension.
-fn spliced(text: &str, set: &Value, pictures: &Pictures<'_>) -> Result<String, SpliceError> {
+fn spliced(text: &str, set: &Value, pictures: &Pictures<'_>) -> Result<String, Invalid> {
     let root = Spot::root(text)?;
     let mut document = Document { members: root.members()?, edits: Edits::default(), new: Vec::new() };
     let frame_node = json!({ "name": "shadow planes", "extensions": { EXTENSION: { "set": 0 } } });
@@ -394,7 +408,7 @@ impl<'a> Document<'a> {
     }
 
     /// Appends to an array of the root, which is made where it is missing. Returns the first new index.
-    fn append(&mut self, key: &'static str, elements: &[Value]) -> Result<usize, SpliceError> {
+    fn append(&mut self, key: &'static str, elements: &[Value]) -> Result<usize, Invalid> {
         match self.member(key) {
             Some(array) => {
                 let texts: Vec<String> = elements.iter().map(Value::to_string).collect();
@@ -409,13 +423,13 @@ impl<'a> Document<'a> {
     }
 
     /// Makes the node a root of the default scene: the one that `scene` names, else the first, else none.
-    fn add_to_scene(&mut self, node: usize) -> Result<(), SpliceError> {
+    fn add_to_scene(&mut self, node: usize) -> Result<(), Invalid> {
         let Some(scenes) = self.member("scenes") else { return Ok(()) };
         let scenes = scenes.elements()?;
         let index = self.member("scene").map_or(Ok(0), |spot| spot.slice().parse::<usize>());
         let Some(scene) = index.ok().and_then(|i| scenes.get(i)) else {
-            let why = format!("not one of the {} scenes", scenes.len());
-            return if scenes.is_empty() { Ok(()) } else { Err(SpliceError { pointer: "/scene".into(), why }) };
+            let reason = format!("not one of the {} scenes", scenes.len());
+            return if scenes.is_empty() { Ok(()) } else { Err(Invalid { pointer: "/scene".into(), reason }) };
         };
         match scene.member("nodes")? {
             Some(nodes) => self.edits.append(&nodes, &[node.to_string()]),
@@ -424,9 +438,10 @@ impl<'a> Document<'a> {
     }
 
     /// Sampler, images, textures, and for pictures inside the file buffer views and the buffer's new length.
-    fn add_textures(&mut self, pictures: &Pictures<'_>) -> Result<(), SpliceError> {
-        // 9729 LINEAR, 33071 CLAMP_TO_EDGE.
-        let sampler = json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 });
+    fn add_textures(&mut self, pictures: &Pictures<'_>) -> Result<(), Invalid> {
+        let clamp = WrappingMode::ClampToEdge;
+        let sampler =
+            json!({ "magFilter": MagFilter::Linear, "minFilter": MinFilter::Linear, "wrapS": clamp, "wrapT": clamp });
         let sampler = self.append("samplers", &[sampler])?;
         let names = pictures.pictures.iter();
         let images: Vec<Value> = match &pictures.offsets {
@@ -450,8 +465,8 @@ impl<'a> Document<'a> {
         Ok(())
     }
 
-    fn lengthen_buffer(&mut self, length: usize) -> Result<(), SpliceError> {
-        let missing = || SpliceError { pointer: "/buffers/0/byteLength".into(), why: "missing".into() };
+    fn lengthen_buffer(&mut self, length: usize) -> Result<(), Invalid> {
+        let missing = || Invalid { pointer: "/buffers/0/byteLength".into(), reason: "missing".into() };
         let buffers = self.member("buffers").ok_or_else(missing)?.elements()?;
         let byte_length = buffers.first().ok_or_else(missing)?.member("byteLength")?.ok_or_else(missing)?;
         self.edits.replace(&byte_length, length.to_string());

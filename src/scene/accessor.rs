@@ -10,10 +10,12 @@
 
 use super::{
     Fault,
-    document::{self, Document},
+    buffers::Buffers,
+    document::{self, Document, Listed},
     extensions,
-    files::Buffers,
 };
+use gltf::json::accessor::{ComponentType, GenericComponentType, Type, VALID_INDEX_TYPES};
+use serde_json::json;
 
 /// A document with its buffers.
 pub(super) struct Data<'a> {
@@ -23,50 +25,18 @@ pub(super) struct Data<'a> {
     pub buffers: &'a Buffers<'a>,
 }
 
-/// What a component is made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Component {
-    I8,
-    U8,
-    I16,
-    U16,
-    U32,
-    F32,
-}
-
-impl Component {
-    fn new(code: u64) -> Option<Self> {
-        Some(match code {
-            5120 => Self::I8,
-            5121 => Self::U8,
-            5122 => Self::I16,
-            5123 => Self::U16,
-            5125 => Self::U32,
-            5126 => Self::F32,
-            _ => return None,
-        })
-    }
-
-    fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::U32 | Self::F32 => 4,
-        }
-    }
-
-    /// The number in the first bytes; `None` where there are too few.
-    fn decode(self, bytes: &[u8], normalized: bool) -> Option<f64> {
-        let (value, largest) = match self {
-            Self::I8 => (f64::from(i8::from_le_bytes(*bytes.first_chunk()?)), f64::from(i8::MAX)),
-            Self::U8 => (f64::from(u8::from_le_bytes(*bytes.first_chunk()?)), f64::from(u8::MAX)),
-            Self::I16 => (f64::from(i16::from_le_bytes(*bytes.first_chunk()?)), f64::from(i16::MAX)),
-            Self::U16 => (f64::from(u16::from_le_bytes(*bytes.first_chunk()?)), f64::from(u16::MAX)),
-            Self::U32 => (f64::from(u32::from_le_bytes(*bytes.first_chunk()?)), f64::from(u32::MAX)),
-            Self::F32 => return Some(f64::from(f32::from_le_bytes(*bytes.first_chunk()?))),
-        };
-        Some(if normalized { (value / largest).max(-1.0) } else { value })
-    }
+/// The number in the first bytes; `None` where there are too few.
+fn decode(component: ComponentType, bytes: &[u8], normalized: bool) -> Option<f64> {
+    use ComponentType as C;
+    let (value, largest) = match component {
+        C::I8 => (f64::from(i8::from_le_bytes(*bytes.first_chunk()?)), f64::from(i8::MAX)),
+        C::U8 => (f64::from(u8::from_le_bytes(*bytes.first_chunk()?)), f64::from(u8::MAX)),
+        C::I16 => (f64::from(i16::from_le_bytes(*bytes.first_chunk()?)), f64::from(i16::MAX)),
+        C::U16 => (f64::from(u16::from_le_bytes(*bytes.first_chunk()?)), f64::from(u16::MAX)),
+        C::U32 => (f64::from(u32::from_le_bytes(*bytes.first_chunk()?)), f64::from(u32::MAX)),
+        C::F32 => return Some(f64::from(f32::from_le_bytes(*bytes.first_chunk()?))),
+    };
+    Some(if normalized { (value / largest).max(-1.0) } else { value })
 }
 
 /// What the components of an accessor may be.
@@ -85,7 +55,7 @@ pub(super) struct Accessor<'a> {
     pub index: usize,
     /// Number of elements.
     pub count: u64,
-    component: Component,
+    component: ComponentType,
     width: usize,
     normalized: bool,
     base: Option<Strided<'a>>,
@@ -132,7 +102,7 @@ impl Accessor<'_> {
         };
         let mut element = [0.0; N];
         for (c, value) in element.iter_mut().enumerate() {
-            *value = self.component.decode(bytes.get(c * self.component.size()..)?, self.normalized)?;
+            *value = decode(self.component, bytes.get(c * self.component.size()..)?, self.normalized)?;
         }
         Some(element)
     }
@@ -148,24 +118,18 @@ impl<'a> Data<'a> {
     ///
     /// # Errors
     /// An index, type or component that is wrong, bytes outside the buffer, or compressed data.
-    pub(super) fn accessor(&self, index: usize, user: &str, kind: &str, usage: Use) -> Result<Accessor<'a>, Fault> {
+    pub(super) fn accessor(&self, index: usize, user: &str, kind: Type, usage: Use) -> Result<Accessor<'a>, Fault> {
         let Some(record) = self.document.accessors.get(index) else {
             return Err(Fault::index(user, index, "accessors", self.document.accessors.len()));
         };
         let pointer = format!("/accessors/{index}");
-        if record.kind != kind {
-            let reason = format!("{:?}, but {user} needs {kind:?}", record.kind);
-            return Err(Fault::new(format!("{pointer}/type"), reason));
+        let type_pointer = format!("{pointer}/type");
+        let found = record.kind.get(&type_pointer)?;
+        if found != kind {
+            return Err(Fault::new(type_pointer, format!("{}, but {user} needs {}", json!(found), json!(kind))));
         }
-        let width = match kind {
-            "SCALAR" => 1,
-            "VEC2" => 2,
-            "VEC3" => 3,
-            "VEC4" => 4,
-            "MAT4" => 16,
-            _ => return Err(Fault::new(format!("{pointer}/type"), "not a type that is read here")),
-        };
-        let component = component(record.component_type, &format!("{pointer}/componentType"), usage)?;
+        let width = kind.multiplicity();
+        let component = component(&record.component_type, &format!("{pointer}/componentType"), usage)?;
         let size = width * component.size();
         let base = match record.buffer_view {
             Some(view) => Some(self.strided(&Range {
@@ -187,7 +151,7 @@ impl<'a> Data<'a> {
     /// Opens the sparse part of the accessor at `pointer`, whose elements have `size` bytes.
     fn sparse(&self, record: &document::Sparse, pointer: &str, count: u64, size: usize) -> Result<Sparse<'a>, Fault> {
         let at = format!("{pointer}/sparse/indices");
-        let component = component(record.indices.component_type, &format!("{at}/componentType"), Use::Index)?;
+        let component = record.indices.component_type.get(&format!("{at}/componentType"))?.0;
         let numbers = self.strided(&Range {
             user: format!("{at}/bufferView"),
             owner: at.clone(),
@@ -210,7 +174,7 @@ impl<'a> Data<'a> {
         // The count is honest now: that many numbers are in the buffer.
         let mut indices: Vec<u64> = Vec::new();
         for i in 0..record.count {
-            let index = numbers.element(i).and_then(|bytes| component.decode(bytes, false)).unwrap_or(0.0) as u64;
+            let index = numbers.element(i).and_then(|bytes| decode(component, bytes, false)).unwrap_or(0.0) as u64;
             if index >= count {
                 return Err(Fault::new(at, format!("index {index} at {i}, but the accessor has {count} elements")));
             }
@@ -318,11 +282,11 @@ struct Range {
     strided: bool,
 }
 
-/// The component of that code, if `usage` allows it.
-fn component(code: u64, pointer: &str, usage: Use) -> Result<Component, Fault> {
-    let component = Component::new(code)
-        .ok_or_else(|| Fault::new(pointer, format!("{code}, but only 5120 to 5123, 5125 and 5126 exist")))?;
-    if usage == Use::Index && !matches!(component, Component::U8 | Component::U16 | Component::U32) {
+/// The component type, if `usage` allows it.
+fn component(listed: &Listed<GenericComponentType>, pointer: &str, usage: Use) -> Result<ComponentType, Fault> {
+    let component = listed.get(pointer)?.0;
+    let code = component.as_gl_enum();
+    if usage == Use::Index && !VALID_INDEX_TYPES.contains(&code) {
         return Err(Fault::new(pointer, format!("{code}, but indices are 5121, 5123 or 5125 (unsigned integers)")));
     }
     Ok(component)

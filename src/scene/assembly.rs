@@ -11,12 +11,13 @@ use super::{
     Fault, Notices, Scene,
     accessor::{Accessor, Data, Use},
     document::{Instancing, Node, record},
-    files::ModelFile,
     materials::Surfaces,
     nodes::{Hierarchy, placement},
     primitive::{Pose, Primitive, Transform},
 };
+use crate::gltf_file::GltfFile;
 use glam::{DAffine3, DMat3, DVec3};
+use gltf::json::accessor::Type;
 use std::collections::HashMap;
 
 /// Most triangles after all copies: about 2 GB in a [`Scene`]. Ten times the largest scanned models that are
@@ -50,12 +51,12 @@ struct Copies<'a> {
 /// # Errors
 /// Whatever is wrong with a record that the scene uses, no triangles, or more than the limits.
 pub(super) fn assemble(
-    model: &ModelFile,
+    file: &GltfFile<'_>,
     data: &Data<'_>,
     hierarchy: &Hierarchy,
     notices: &mut Notices,
 ) -> Result<Scene, Fault> {
-    let mut surfaces = Surfaces::new(model, data);
+    let mut surfaces = Surfaces::new(file, data);
     let mut meshes: Vec<Option<Vec<Primitive<'_>>>> = Vec::new();
     meshes.resize_with(data.document.meshes.len(), || None);
     // First round: open and count.
@@ -122,13 +123,13 @@ fn copies<'a>(data: &Data<'a>, node: &Node, index: usize) -> Result<Option<Copie
     let Some(value) = node.extensions.get(INSTANCING) else { return Ok(None) };
     let pointer = format!("/nodes/{index}/extensions/{INSTANCING}");
     let instancing: Instancing = record(value, &pointer)?;
-    let open = |name: &str, kind: &str| {
+    let open = |name: &str, kind: Type| {
         let user = format!("{pointer}/attributes/{name}");
         instancing.attributes.get(name).map(|i| data.accessor(*i, &user, kind, Use::Number)).transpose()
     };
-    let translation = open("TRANSLATION", "VEC3")?;
-    let rotation = open("ROTATION", "VEC4")?;
-    let scale = open("SCALE", "VEC3")?;
+    let translation = open("TRANSLATION", Type::Vec3)?;
+    let rotation = open("ROTATION", Type::Vec4)?;
+    let scale = open("SCALE", Type::Vec3)?;
     let given = || [&translation, &rotation, &scale].into_iter().flatten();
     let Some(count) = given().map(|accessor| accessor.count).min() else { return Ok(None) };
     if given().any(|accessor| accessor.count != count) {
@@ -207,7 +208,7 @@ fn joint_transforms(data: &Data<'_>, hierarchy: &Hierarchy, skin: usize, node: u
         return Err(Fault::index(&format!("/nodes/{node}/skin"), skin, "skins", data.document.skins.len()));
     };
     let user = format!("/skins/{skin}/inverseBindMatrices");
-    let binds = record.inverse_bind_matrices.map(|i| data.accessor(i, &user, "MAT4", Use::Number)).transpose()?;
+    let binds = record.inverse_bind_matrices.map(|i| data.accessor(i, &user, Type::Mat4, Use::Number)).transpose()?;
     let transform = |(i, joint): (usize, &usize)| {
         let Some(model_from_joint) = hierarchy.model_from_node.get(*joint) else {
             let pointer = format!("/skins/{skin}/joints/{i}");

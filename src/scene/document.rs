@@ -1,16 +1,61 @@
 //! The JSON of a glTF file, as typed records.
 //!
-//! In: the JSON text. Out: a [`Document`], where every index and number is still unchecked against the rest of
+//! In: the JSON. Out: a [`Document`], where every index and number is still unchecked against the rest of
 //! the file: the stages that use it check it and answer with its JSON pointer.
 //!
-//! Not the records of the `gltf` crate: they cut indices to 32 bits without a word, refuse a scene without
-//! `nodes` (which is legal), round node transforms to f32 and report errors without a JSON pointer. The tests use
-//! that crate as the second opinion.
+//! The enumerations (component types, modes, ..) are those of the `gltf` crate, the records are not: it cuts
+//! indices to 32 bits without a word, refuses a scene without `nodes` (which is legal), rounds node transforms to
+//! f32 and reports errors without a JSON pointer. The tests use its readers as the second opinion.
 
 use super::Fault;
-use serde::{Deserialize, de::DeserializeOwned};
+use gltf::json::{
+    accessor::{GenericComponentType, IndexComponentType, Type},
+    material::AlphaMode,
+    mesh::Mode,
+    texture::WrappingMode,
+    validation::Checked,
+};
+use serde::{
+    Deserialize, Deserializer,
+    de::{DeserializeOwned, Error as _},
+};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
+
+/// A value of an enumeration. One that glTF 2.0 does not have is an error only where it is used.
+#[derive(Clone, Debug)]
+pub(super) struct Listed<T>(Result<T, Value>);
+
+impl<T: Copy> Listed<T> {
+    /// The value, if glTF 2.0 has it.
+    pub(super) fn known(&self) -> Option<T> {
+        self.0.as_ref().ok().copied()
+    }
+
+    /// The value, which stands at `pointer`.
+    ///
+    /// # Errors
+    /// glTF 2.0 does not have it.
+    pub(super) fn get(&self, pointer: &str) -> Result<T, Fault> {
+        let unknown = |value: &Value| Fault::new(pointer, format!("{value}, but glTF 2.0 has no such value"));
+        self.0.as_ref().copied().map_err(unknown)
+    }
+}
+
+impl<'de, T> Deserialize<'de> for Listed<T>
+where
+    Checked<T>: DeserializeOwned,
+{
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = Value::deserialize(deserializer)?;
+        // The crate looks at the lower 32 bits only.
+        let is_whole = value.as_u64().is_none_or(|code| u32::try_from(code).is_ok());
+        Ok(Self(match Checked::<T>::deserialize(&value).map_err(D::Error::custom)? {
+            Checked::Valid(known) if is_whole => Ok(known),
+            _ => Err(value),
+        }))
+    }
+}
 
 /// Extension objects by name.
 pub(super) type Extensions = Map<String, Value>;
@@ -57,12 +102,12 @@ pub(super) struct Accessor {
     pub buffer_view: Option<usize>,
     #[serde(default)]
     pub byte_offset: u64,
-    pub component_type: u64,
+    pub component_type: Listed<GenericComponentType>,
     #[serde(default)]
     pub normalized: bool,
     pub count: u64,
     #[serde(rename = "type")]
-    pub kind: String,
+    pub kind: Listed<Type>,
     pub sparse: Option<Sparse>,
 }
 
@@ -81,7 +126,7 @@ pub(super) struct SparseIndices {
     pub buffer_view: usize,
     #[serde(default)]
     pub byte_offset: u64,
-    pub component_type: u64,
+    pub component_type: Listed<IndexComponentType>,
 }
 
 /// `accessors[i].sparse.values`.
@@ -137,8 +182,8 @@ pub(super) struct Texture {
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Sampler {
-    pub wrap_s: Option<u64>,
-    pub wrap_t: Option<u64>,
+    pub wrap_s: Option<Listed<WrappingMode>>,
+    pub wrap_t: Option<Listed<WrappingMode>>,
 }
 
 /// `materials[i]`.
@@ -146,7 +191,7 @@ pub(super) struct Sampler {
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Material {
     pub alpha_cutoff: Option<f64>,
-    pub alpha_mode: Option<String>,
+    pub alpha_mode: Option<Listed<AlphaMode>>,
     pub double_sided: bool,
     pub pbr_metallic_roughness: Pbr,
 }
@@ -195,7 +240,7 @@ pub(super) struct Primitive {
     pub attributes: BTreeMap<String, usize>,
     pub indices: Option<usize>,
     pub material: Option<usize>,
-    pub mode: Option<u64>,
+    pub mode: Option<Listed<Mode>>,
     #[serde(default)]
     pub targets: Vec<BTreeMap<String, usize>>,
     #[serde(default)]
@@ -240,35 +285,27 @@ pub(super) struct Skin {
 }
 
 impl Document {
-    /// Parses the JSON text of a glTF file.
+    /// Takes the records out of the JSON of a glTF file.
     ///
     /// # Errors
-    /// Text that is not UTF-8 or not JSON, another version than 2.x, or a record of the wrong shape.
-    pub(super) fn parse(text: &[u8]) -> Result<Self, Fault> {
-        let text = std::str::from_utf8(text)
-            .map_err(|error| Fault::new("", format!("the JSON is not UTF-8 after byte {}", error.valid_up_to())))?;
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let root: Value = serde_json::from_str(text).map_err(|error| Fault::new("", format!("not JSON: {error}")))?;
-        if !root.is_object() {
-            return Err(Fault::new("", "the JSON is not an object"));
-        }
-        check_version(&root)?;
+    /// A record of the wrong shape.
+    pub(super) fn parse(root: &Value) -> Result<Self, Fault> {
         Ok(Self {
-            accessors: list(&root, "accessors")?,
-            buffer_views: list(&root, "bufferViews")?,
-            buffers: list(&root, "buffers")?,
-            images: list(&root, "images")?,
-            materials: list(&root, "materials")?,
-            meshes: list(&root, "meshes")?,
-            nodes: list(&root, "nodes")?,
-            samplers: list(&root, "samplers")?,
-            scenes: list(&root, "scenes")?,
+            accessors: list(root, "accessors")?,
+            buffer_views: list(root, "bufferViews")?,
+            buffers: list(root, "buffers")?,
+            images: list(root, "images")?,
+            materials: list(root, "materials")?,
+            meshes: list(root, "meshes")?,
+            nodes: list(root, "nodes")?,
+            samplers: list(root, "samplers")?,
+            scenes: list(root, "scenes")?,
             scene: root.get("scene").map(|value| record(value, "/scene")).transpose()?,
-            skins: list(&root, "skins")?,
-            textures: list(&root, "textures")?,
+            skins: list(root, "skins")?,
+            textures: list(root, "textures")?,
             animations: root.get("animations").and_then(Value::as_array).map_or(0, Vec::len),
-            extensions_used: list(&root, "extensionsUsed")?,
-            extensions_required: list(&root, "extensionsRequired")?,
+            extensions_used: list(root, "extensionsUsed")?,
+            extensions_required: list(root, "extensionsRequired")?,
         })
     }
 }
@@ -297,22 +334,5 @@ fn list<T: DeserializeOwned>(root: &Value, key: &str) -> Result<Vec<T>, Fault> {
             values.iter().enumerate().map(|(i, value)| record(value, &format!("/{key}/{i}"))).collect()
         }
         Some(_) => Err(Fault::new(format!("/{key}"), "not a list")),
-    }
-}
-
-/// `asset.version` must be 2.x, and `asset.minVersion`, where it is given, 2.0.
-fn check_version(root: &Value) -> Result<(), Fault> {
-    let of = |key: &str| root.get("asset").and_then(|asset| asset.get(key)).and_then(Value::as_str);
-    match of("version") {
-        Some(version) if version.starts_with("2.") => {}
-        Some(version) => {
-            let remedy = "convert it with `npx gltf-pipeline -i IN -o OUT`";
-            return Err(Fault::new("/asset/version", format!("glTF {version:?}, but 2.x is read: {remedy}")));
-        }
-        None => return Err(Fault::new("/asset/version", "missing: this is not a glTF 2.0 file")),
-    }
-    match of("minVersion") {
-        None | Some("2.0") => Ok(()),
-        Some(version) => Err(Fault::new("/asset/minVersion", format!("needs a reader of glTF {version:?}, not 2.0"))),
     }
 }

@@ -8,10 +8,11 @@
 use super::{
     Fault, Material, Notices,
     accessor::Data,
-    document::{self, TextureInfo, TextureTransform, record},
-    files::{Fetch, ModelFile},
+    document::{self, Listed, TextureInfo, TextureTransform, record},
 };
+use crate::gltf_file::{GltfFile, UriError};
 use glam::{DAffine2, DVec2};
+use gltf::json::{material::AlphaMode, texture::WrappingMode};
 use image::{ImageFormat, ImageReader, Limits, RgbaImage};
 use shadowfit_solver::mesh::{Cutout, Sides};
 use std::{collections::HashMap, io::Cursor, sync::Arc};
@@ -21,10 +22,6 @@ pub const MAX_IMAGE_TEXELS: u64 = 1 << 26;
 
 /// Texels of all images and cut-outs together: 1 GiB decoded. Sixteen textures of 4096 x 4096 fit.
 pub const MAX_TEXELS: u64 = 1 << 28;
-
-/// Texels clamp to the edge; REPEAT is the default.
-const CLAMP_TO_EDGE: u64 = 33071;
-const MIRRORED_REPEAT: u64 = 33648;
 
 /// What the triangles of a material need.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +49,7 @@ pub(super) struct UvSource {
 
 /// The materials of a document, prepared on demand.
 pub(super) struct Surfaces<'a> {
-    model: &'a ModelFile,
+    file: &'a GltfFile<'a>,
     data: &'a Data<'a>,
     prepared: Vec<Option<Surface>>,
     image_of: HashMap<usize, Result<usize, Fault>>,
@@ -65,21 +62,22 @@ pub(super) struct Surfaces<'a> {
     pub cutouts: Vec<Arc<Cutout>>,
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum AlphaMode {
-    Opaque,
-    Mask,
-    Blend,
+/// Why a texture has no image.
+enum NoImage {
+    /// The file is broken or reaches where a model must not: no reason to draw without.
+    Refused(Fault),
+    /// The image is missing, damaged or of another format.
+    Missing(Fault),
 }
 
 impl<'a> Surfaces<'a> {
     /// All materials with their factors, none of them prepared.
-    pub(super) fn new(model: &'a ModelFile, data: &'a Data<'a>) -> Self {
+    pub(super) fn new(file: &'a GltfFile<'a>, data: &'a Data<'a>) -> Self {
         let mut materials = vec![plain(&document::Material::default())];
         materials.extend(data.document.materials.iter().map(plain));
         let prepared = vec![None; materials.len()];
         let (image_of, texels) = (HashMap::new(), 0);
-        Self { model, data, prepared, image_of, texels, materials, images: Vec::new(), cutouts: Vec::new() }
+        Self { file, data, prepared, image_of, texels, materials, images: Vec::new(), cutouts: Vec::new() }
     }
 
     /// The surface of material `index`, which `user` (a JSON pointer) refers to; of the default without one.
@@ -107,7 +105,10 @@ impl<'a> Surfaces<'a> {
 
     fn prepare(&mut self, record: &document::Material, slot: usize, notices: &mut Notices) -> Result<Surface, Fault> {
         let pointer = format!("/materials/{}", slot.saturating_sub(1));
-        let mode = alpha_mode(record, &pointer)?;
+        let mode = match &record.alpha_mode {
+            Some(mode) => mode.get(&format!("{pointer}/alphaMode"))?,
+            None => AlphaMode::Opaque,
+        };
         if mode == AlphaMode::Blend {
             notices.add("blended materials", 1, "alphaMode BLEND: taken as opaque, and so it casts a full shadow");
         }
@@ -117,9 +118,9 @@ impl<'a> Surfaces<'a> {
         if let Some(info) = info {
             match self.texture(info, &info_pointer, slot, notices) {
                 Ok(image) => self.materials[slot].image = Some(image),
-                Err(Fetch::Forbidden(fault)) => return Err(fault),
-                Err(Fetch::Broken(fault)) if mode == AlphaMode::Mask => return Err(fault),
-                Err(Fetch::Broken(fault)) => {
+                Err(NoImage::Refused(fault)) => return Err(fault),
+                Err(NoImage::Missing(fault)) if mode == AlphaMode::Mask => return Err(fault),
+                Err(NoImage::Missing(fault)) => {
                     let why = format!("drawn with the base colour factor alone; the first: {fault}");
                     notices.add("base colour textures", 1, &why);
                 }
@@ -144,21 +145,21 @@ impl<'a> Surfaces<'a> {
         pointer: &str,
         slot: usize,
         notices: &mut Notices,
-    ) -> Result<usize, Fetch> {
+    ) -> Result<usize, NoImage> {
         let document = self.data.document;
         let Some(texture) = document.textures.get(info.index) else {
             let fault = Fault::index(&format!("{pointer}/index"), info.index, "textures", document.textures.len());
-            return Err(Fetch::Forbidden(fault));
+            return Err(NoImage::Refused(fault));
         };
         let at = format!("/textures/{}", info.index);
         if let Some(index) = texture.sampler {
             let Some(sampler) = document.samplers.get(index) else {
                 let fault = Fault::index(&format!("{at}/sampler"), index, "samplers", document.samplers.len());
-                return Err(Fetch::Forbidden(fault));
+                return Err(NoImage::Refused(fault));
             };
-            let wraps = [sampler.wrap_s, sampler.wrap_t];
-            self.materials[slot].repeat = wraps.map(|wrap| wrap != Some(CLAMP_TO_EDGE));
-            if wraps.contains(&Some(MIRRORED_REPEAT)) {
+            let wraps = [&sampler.wrap_s, &sampler.wrap_t].map(|wrap| wrap.as_ref().and_then(Listed::known));
+            self.materials[slot].repeat = wraps.map(|wrap| wrap != Some(WrappingMode::ClampToEdge));
+            if wraps.contains(&Some(WrappingMode::MirroredRepeat)) {
                 notices.add("mirrored textures", 1, "MIRRORED_REPEAT: taken as REPEAT");
             }
         }
@@ -167,14 +168,14 @@ impl<'a> Surfaces<'a> {
                 Some(name) => image_format(name),
                 None => Fault::new(format!("{at}/source"), "missing: the texture has no image"),
             };
-            return Err(Fetch::Broken(fault));
+            return Err(NoImage::Missing(fault));
         };
         if source >= document.images.len() {
             let fault = Fault::index(&format!("{at}/source"), source, "images", document.images.len());
-            return Err(Fetch::Forbidden(fault));
+            return Err(NoImage::Refused(fault));
         }
         if let Some(known) = self.image_of.get(&source) {
-            return known.clone().map_err(Fetch::Broken);
+            return known.clone().map_err(NoImage::Missing);
         }
         match self.decode(source) {
             Ok(image) => {
@@ -182,31 +183,38 @@ impl<'a> Surfaces<'a> {
                 self.image_of.insert(source, Ok(self.images.len() - 1));
                 Ok(self.images.len() - 1)
             }
-            Err(Fetch::Broken(fault)) => {
+            Err(NoImage::Missing(fault)) => {
                 self.image_of.insert(source, Err(fault.clone()));
-                Err(Fetch::Broken(fault))
+                Err(NoImage::Missing(fault))
             }
-            Err(forbidden) => Err(forbidden),
+            Err(refused) => Err(refused),
         }
     }
 
     /// Decodes image `index`.
-    fn decode(&mut self, index: usize) -> Result<RgbaImage, Fetch> {
+    fn decode(&mut self, index: usize) -> Result<RgbaImage, NoImage> {
         let pointer = format!("/images/{index}");
-        let broken = |reason: String| Fetch::Broken(Fault::new(pointer.as_str(), reason));
+        let broken = |reason: String| NoImage::Missing(Fault::new(pointer.as_str(), reason));
         let record = &self.data.document.images[index];
         let fetched;
         let bytes: &[u8] = match (&record.uri, record.buffer_view) {
             (Some(uri), _) => {
-                fetched = self.model.fetch(uri, &format!("{pointer}/uri"))?;
+                fetched = self.file.fetch(uri).map_err(|error| {
+                    let fault = Fault::new(format!("{pointer}/uri"), error.to_string());
+                    if matches!(error, UriError::Forbidden(_)) {
+                        NoImage::Refused(fault)
+                    } else {
+                        NoImage::Missing(fault)
+                    }
+                })?;
                 &fetched
             }
-            (None, Some(view)) => self.data.view(view, &format!("{pointer}/bufferView")).map_err(Fetch::Forbidden)?,
+            (None, Some(view)) => self.data.view(view, &format!("{pointer}/bufferView")).map_err(NoImage::Refused)?,
             (None, None) => return Err(broken("has neither uri nor bufferView".to_owned())),
         };
         let format = image::guess_format(bytes).map_err(|error| broken(error.to_string()))?;
         if !matches!(format, ImageFormat::Png | ImageFormat::Jpeg) {
-            return Err(Fetch::Broken(image_format(&format!("the image format {format:?}"))));
+            return Err(NoImage::Missing(image_format(&format!("the image format {format:?}"))));
         }
         let mut limits = Limits::default();
         limits.max_alloc = Some(8 * MAX_IMAGE_TEXELS);
@@ -251,24 +259,12 @@ impl<'a> Surfaces<'a> {
 /// The factors of a material, without its texture.
 fn plain(record: &document::Material) -> Material {
     let factor = record.pbr_metallic_roughness.base_color_factor.unwrap_or([1.0; 4]);
-    let is_mask = record.alpha_mode.as_deref() == Some("MASK");
+    let is_mask = record.alpha_mode.as_ref().and_then(Listed::known) == Some(AlphaMode::Mask);
     Material {
         base_color: factor.map(|x| x.clamp(0.0, 1.0) as f32),
         image: None,
         repeat: [true; 2],
         alpha_cutoff: is_mask.then(|| record.alpha_cutoff.unwrap_or(0.5) as f32),
-    }
-}
-
-fn alpha_mode(record: &document::Material, pointer: &str) -> Result<AlphaMode, Fault> {
-    match record.alpha_mode.as_deref() {
-        None | Some("OPAQUE") => Ok(AlphaMode::Opaque),
-        Some("MASK") => Ok(AlphaMode::Mask),
-        Some("BLEND") => Ok(AlphaMode::Blend),
-        Some(other) => {
-            let reason = format!("{other:?}, but only OPAQUE, MASK and BLEND exist");
-            Err(Fault::new(format!("{pointer}/alphaMode"), reason))
-        }
     }
 }
 

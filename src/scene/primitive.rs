@@ -12,22 +12,16 @@ use super::{
     materials::{Surface, Surfaces},
 };
 use glam::{DAffine3, DMat3, DVec2, DVec3, Vec2, Vec3};
+use gltf::json::{accessor::Type, mesh::Mode};
 use std::collections::BTreeMap;
 
 /// Largest coordinate in model space, metres: the square of a distance beyond it overflows in the f32 of
 /// shaders. A light year is 1e16 m.
 pub const MAX_COORDINATE: f64 = 1e18;
 
-/// How corners form triangles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Mode {
-    Triangles,
-    Strip,
-    Fan,
-}
-
 /// A primitive that has triangles.
 pub(super) struct Primitive<'a> {
+    /// `Triangles`, `TriangleStrip` or `TriangleFan`.
     mode: Mode,
     /// Number of triangles.
     pub triangles: u64,
@@ -107,14 +101,17 @@ impl<'a> Primitive<'a> {
         surfaces: &mut Surfaces<'_>,
         notices: &mut Notices,
     ) -> Result<Option<Self>, Fault> {
-        let mode = match record.mode.unwrap_or(4) {
-            0 => return Ok(skip(notices, "points", "they have no area: not drawn, no shadow")),
-            1..=3 => return Ok(skip(notices, "lines", "they have no area: not drawn, no shadow")),
-            4 => Mode::Triangles,
-            5 => Mode::Strip,
-            6 => Mode::Fan,
-            other => return Err(Fault::new(format!("{pointer}/mode"), format!("{other}, but 0 to 6 exist"))),
+        let mode = match &record.mode {
+            Some(mode) => mode.get(&format!("{pointer}/mode"))?,
+            None => Mode::Triangles,
         };
+        match mode {
+            Mode::Points => return Ok(skip(notices, "points", "they have no area: not drawn, no shadow")),
+            Mode::Lines | Mode::LineLoop | Mode::LineStrip => {
+                return Ok(skip(notices, "lines", "they have no area: not drawn, no shadow"));
+            }
+            Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan => {}
+        }
         let Some(position_index) = record.attributes.get("POSITION") else {
             return Ok(skip(notices, "primitives without POSITION", "nothing to draw"));
         };
@@ -125,9 +122,9 @@ impl<'a> Primitive<'a> {
             }
         }
         let attributes = Attributes { data, record: &record.attributes, pointer: format!("{pointer}/attributes") };
-        let positions = data.accessor(*position_index, &attributes.key("POSITION"), "VEC3", Use::Number)?;
+        let positions = data.accessor(*position_index, &attributes.key("POSITION"), Type::Vec3, Use::Number)?;
         let user = format!("{pointer}/indices");
-        let indices = record.indices.map(|i| data.accessor(i, &user, "SCALAR", Use::Index)).transpose()?;
+        let indices = record.indices.map(|i| data.accessor(i, &user, Type::Scalar, Use::Index)).transpose()?;
         let corners = indices.as_ref().map_or(positions.count, |indices| indices.count);
         if corners < 3 {
             return Ok(skip(notices, "primitives with less than three corners", "no triangle to draw"));
@@ -139,7 +136,7 @@ impl<'a> Primitive<'a> {
         let surface = surfaces.surface(record.material, &format!("{pointer}/material"), notices)?;
         let count = positions.count;
         let uvs = match surface.uv {
-            Some(uv) => attributes.open(&format!("TEXCOORD_{}", uv.set), "VEC2", count)?,
+            Some(uv) => attributes.open(&format!("TEXCOORD_{}", uv.set), Type::Vec2, count)?,
             None => None,
         };
         if surface.uv.is_some() && uvs.is_none() {
@@ -148,7 +145,7 @@ impl<'a> Primitive<'a> {
         if record.attributes.contains_key("COLOR_0") {
             notices.add("vertex colours", 1, "drawn without them");
         }
-        let normals = attributes.open("NORMAL", "VEC3", count)?;
+        let normals = attributes.open("NORMAL", Type::Vec3, count)?;
         let targets = open_targets(data, record, pointer, count)?;
         let skinning = open_skinning(&attributes, count)?;
         Ok(Some(Self { mode, triangles, surface, positions, normals, uvs, indices, targets, skinning }))
@@ -172,9 +169,9 @@ impl<'a> Primitive<'a> {
         for t in 0..self.triangles {
             // The winding of strips and fans: glTF 2.0 specification, section 3.7.2.1.
             let numbers = match self.mode {
-                Mode::Triangles => [3 * t, 3 * t + 1, 3 * t + 2],
-                Mode::Strip => [t, t + 1 + t % 2, t + 2 - t % 2],
-                Mode::Fan => [t + 1, t + 2, 0],
+                Mode::TriangleStrip => [t, t + 1 + t % 2, t + 2 - t % 2],
+                Mode::TriangleFan => [t + 1, t + 2, 0],
+                _ => [3 * t, 3 * t + 1, 3 * t + 2],
             };
             let [a, b, c] = numbers.map(|number| self.corner(number, pose, notices));
             let (a, b, c) = (a?, b?, c?);
@@ -303,7 +300,7 @@ impl<'a> Attributes<'_, 'a, '_> {
     }
 
     /// Opens the attribute, if there is one, and checks that it covers `count` vertices.
-    fn open(&self, name: &str, kind: &str, count: u64) -> Result<Option<Accessor<'a>>, Fault> {
+    fn open(&self, name: &str, kind: Type, count: u64) -> Result<Option<Accessor<'a>>, Fault> {
         let Some(index) = self.record.get(name) else { return Ok(None) };
         let accessor = self.data.accessor(*index, &self.key(name), kind, Use::Number)?;
         if accessor.count < count {
@@ -323,8 +320,8 @@ fn open_targets<'a>(
     let target = |(i, record): (usize, &BTreeMap<String, usize>)| {
         let attributes = Attributes { data, record, pointer: format!("{pointer}/targets/{i}") };
         Ok(Target {
-            positions: attributes.open("POSITION", "VEC3", count)?,
-            normals: attributes.open("NORMAL", "VEC3", count)?,
+            positions: attributes.open("POSITION", Type::Vec3, count)?,
+            normals: attributes.open("NORMAL", Type::Vec3, count)?,
         })
     };
     record.targets.iter().enumerate().map(target).collect()
@@ -334,8 +331,8 @@ fn open_skinning<'a>(attributes: &Attributes<'_, 'a, '_>, count: u64) -> Result<
     let mut sets = Vec::new();
     loop {
         let n = sets.len();
-        let joints = attributes.open(&format!("JOINTS_{n}"), "VEC4", count)?;
-        let weights = attributes.open(&format!("WEIGHTS_{n}"), "VEC4", count)?;
+        let joints = attributes.open(&format!("JOINTS_{n}"), Type::Vec4, count)?;
+        let weights = attributes.open(&format!("WEIGHTS_{n}"), Type::Vec4, count)?;
         match (joints, weights) {
             (Some(joints), Some(weights)) => sets.push(Influences { joints, weights }),
             _ => return Ok(sets),

@@ -67,8 +67,8 @@ fn broken_extensions_name_the_place() {
         ("/nodes/1/extensions/SHADOWFIT_node_shadow_planes/set", json!(1), "set: index 1 is out of range"),
         ("/nodes/1/extensions", Value::Null, "0 nodes carry"),
         ("/nodes/1/scale", json!([1, 0, 1]), "/nodes/1: the node's transform has no inverse"),
-        ("/nodes/1/children", json!([1]), "/nodes/1: the node is its own ancestor"),
-        ("/nodes/1/children", json!([9]), "/nodes/1/children/0: index 9"),
+        ("/nodes/1/children", json!([1]), "/nodes/1: is its own ancestor"),
+        ("/nodes/1/children", json!([9]), "/nodes/1/children/0: 9, but /nodes has 2 elements"),
         ("/textures/0/source", json!(5), "/textures/0/source: index 5"),
         ("/images/0/bufferView", json!(0), "cannot decode the texture"),
         ("/bufferViews/1/byteLength", json!(1e9 as u64), "/bufferViews/1: not inside its buffer"),
@@ -92,7 +92,8 @@ fn broken_sidecars_name_the_place() {
     let json = std::fs::read_to_string(&written.sidecar).unwrap();
     let cases = [
         ("/sets/0/planes/2/occluderTexture/uri", json!("../m.atlas-0.png"), "/sets/0/planes/2/occluderTexture/uri"),
-        ("/sets/0/planes/2/occluderTexture/uri", json!("data:,x"), "not base64"),
+        ("/sets/0/planes/2/occluderTexture/uri", json!("data:,x"), "cannot decode the texture"),
+        ("/sets/0/planes/2/occluderTexture/uri", json!("data:;base64,@"), "base64"),
         ("/sets/0/planes/0/side", json!("up"), "/sets/0/planes/0/side"),
         ("/sets", json!([]), "/sets: one set expected, found 0"),
     ];

@@ -2,10 +2,9 @@
 
 use glam::{DVec3, Vec3};
 use serde_json::Value;
-use shadowfit::asset::{
-    AssetError, AssetRequest, Bounds, Written,
-    glb::{self, Chunks},
-    write,
+use shadowfit::{
+    asset::{AssetError, AssetRequest, Bounds, Written, write},
+    gltf_file::container::{self, Chunks},
 };
 use shadowfit_solver::{
     mesh::Frame,
@@ -34,7 +33,7 @@ pub fn document(buffer: &str, more: &str) -> String {
 }
 
 pub fn glb(json: &str, bin: Option<&[u8]>) -> Vec<u8> {
-    glb::join(&Chunks { json, bin, others: vec![] }).unwrap()
+    container::join(&Chunks { json, bin, others: vec![] }).unwrap()
 }
 
 /// Numbers that look random: a linear congruential generator.
@@ -123,7 +122,7 @@ pub fn write_to(input: &Path, out_dir: &Path, planes: &[BakedPlane]) -> Result<W
 /// JSON text and binary chunk of a GLB file.
 pub fn open(path: &Path) -> (String, Option<Vec<u8>>) {
     let bytes = std::fs::read(path).unwrap();
-    let chunks = glb::split(&bytes).unwrap();
+    let chunks = container::split(&bytes).unwrap();
     (chunks.json.to_owned(), chunks.bin.map(<[u8]>::to_vec))
 }
 

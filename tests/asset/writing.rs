@@ -20,7 +20,7 @@ fn external_files_are_copied_beside_the_output() {
         let planes = planes(4);
         let written = folders.write(&input, &planes).unwrap();
         let out = folders.out();
-        assert_eq!(written.copied, [out.join("pic.png"), out.join("sub folder/m.bin")]);
+        assert_eq!(written.copied, [out.join("sub folder/m.bin"), out.join("pic.png")]);
         assert_eq!(written.not_copied, ["gone.png", "https://example.org/a.png"]);
         assert_eq!(fs::read(out.join("sub folder/m.bin")).unwrap(), triangle());
         let (output, bin) = open(&written.model);

@@ -3,7 +3,8 @@
 pub use shadowfit::pipeline::FitRequest;
 use shadowfit::{
     asset::{ShadowSet, read},
-    pipeline::{Effort, FitError, run},
+    effort::Effort,
+    pipeline::{FitError, run},
     report::Report,
 };
 use shadowfit_solver::lights::LightDomain;
@@ -39,16 +40,7 @@ pub fn least() -> Effort {
     (candidates.directions, candidates.offsets, candidates.surface_points) = (60, 8, 100);
     let mut selection = fast.selection;
     (selection.texels, selection.finalists, selection.refined) = (48, 12, 2);
-    Effort {
-        receivers: 8192,
-        lights: 96,
-        search_blocked: 20_000,
-        search_lit: 40_000,
-        candidates,
-        selection,
-        texture_size: 64,
-        ..fast
-    }
+    Effort { receivers: 8192, lights: 96, candidates, selection, texture_size: 64, ..fast }
 }
 
 /// Runs a fit; what it wrote must read back.

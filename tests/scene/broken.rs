@@ -375,13 +375,13 @@ fn truncated_at_every_byte() {
     for length in 0..good.len() {
         assert_eq!(load_in(folder.path(), "m.glb", &good[..length]).unwrap_err().exit_code(), 3, "{length} bytes");
     }
-    // The binary chunk cut short in a file that is honest about it.
+    // The binary chunk cut short (by whole words: chunks are padded) in a file that is honest about it.
     let text = {
         let mut model = model.clone();
         model.json["buffers"][0]["byteLength"] = json!(model.bin.len());
         model.text()
     };
-    for length in 0..model.bin.len() {
+    for length in (0..model.bin.len()).step_by(4) {
         let cut = glb(text.as_bytes(), &model.bin[..length]);
         assert!(load_in(folder.path(), "m.glb", &cut).is_err(), "{length} bytes of the chunk");
     }

@@ -3,8 +3,11 @@
 use super::build::{Model, glb, load_bytes, load_in};
 use base64::Engine as _;
 use serde_json::json;
-use shadowfit::scene::{SceneError, external_files, load};
-use std::fs;
+use shadowfit::{
+    gltf_file::{GltfFile, Invalid},
+    scene::{SceneError, load},
+};
+use std::{fs, path::Path};
 use tempfile::TempDir;
 
 /// The triangle as `.gltf` text with that buffer URI.
@@ -22,11 +25,14 @@ fn external_buffers() {
     for uri in ["bin/a b.bin", "bin/a%20b.bin", "./bin/./a%20b.bin", "bin%2Fa b.bin"] {
         let scene = load_in(folder.path(), "model.gltf", gltf(uri).as_bytes()).unwrap();
         assert_eq!(scene.soup.corners_model.len(), 1);
-        assert_eq!(external_files(&folder.path().join("model.gltf")).unwrap(), ["bin/a b.bin"]);
+        assert_eq!(external_files(folder.path(), &gltf(uri)).unwrap(), ["bin/a b.bin"]);
     }
     // A bare `%` is what some exporters write.
     fs::write(folder.path().join("100%.bin"), Model::triangle().bin).unwrap();
     load_in(folder.path(), "model.gltf", gltf("100%.bin").as_bytes()).unwrap();
+    // An exporter that does not encode: the name itself has an escape in it.
+    fs::write(folder.path().join("a%41.bin"), Model::triangle().bin).unwrap();
+    load_in(folder.path(), "model.gltf", gltf("a%41.bin").as_bytes()).unwrap();
 }
 
 #[test]
@@ -35,7 +41,7 @@ fn a_relative_model_path_works() {
     fs::write(folder.path().join("a.bin"), Model::triangle().bin).unwrap();
     let name = folder.path().file_name().unwrap();
     fs::write(folder.path().join("model.gltf"), gltf("a.bin")).unwrap();
-    load(&std::path::Path::new(name).join("model.gltf")).unwrap();
+    load(&Path::new(name).join("model.gltf")).unwrap();
 }
 
 #[test]
@@ -52,14 +58,13 @@ fn data_uris() {
     ] {
         load_bytes("model.gltf", gltf(&uri).as_bytes()).unwrap();
     }
-    assert!(external_in_memory(&gltf("data:;base64,AAAA")).unwrap().is_empty());
+    assert!(external_files(Path::new("."), &gltf("data:;base64,AAAA")).unwrap().is_empty());
 }
 
-fn external_in_memory(text: &str) -> Result<Vec<String>, SceneError> {
-    let folder = TempDir::new().unwrap();
-    let path = folder.path().join("model.gltf");
-    fs::write(&path, text).unwrap();
-    external_files(&path)
+/// The files that a document in that folder names.
+fn external_files(folder: &Path, text: &str) -> Result<Vec<String>, Invalid> {
+    let externals = GltfFile::new(&folder.join("model.gltf"), text.as_bytes())?.externals()?;
+    Ok(externals.files.into_iter().map(|(file, _)| file.relative).collect())
 }
 
 #[test]
@@ -67,9 +72,10 @@ fn external_files_come_once_in_order() {
     let text = json!({
         "asset": {"version": "2.0"},
         "buffers": [{"byteLength": 1, "uri": "b.bin"}, {"byteLength": 1, "uri": "./b.bin"}, {"byteLength": 1}],
-        "images": [{"uri": "t/%C3%A4.png"}, {"uri": "data:image/png;base64,"}, {"uri": "a.jpg"}, {"bufferView": 0}]
+        "images": [{"uri": "t/%C3%A4.png"}, {"uri": "data:image/png;base64,"}, {"uri": "a.jpg"}, {"bufferView": 0},
+            {"uri": "https://example.org/a.png"}]
     });
-    assert_eq!(external_in_memory(&text.to_string()).unwrap(), ["b.bin", "t/ä.png", "a.jpg"]);
+    assert_eq!(external_files(Path::new("."), &text.to_string()).unwrap(), ["b.bin", "t/ä.png", "a.jpg"]);
 }
 
 #[test]
@@ -103,7 +109,7 @@ fn paths_that_leave_the_folder_are_refused() {
         let error = load_in(&folder, "model.gltf", gltf(uri).as_bytes()).unwrap_err();
         let SceneError::Invalid { pointer, .. } = &error else { panic!("{uri}: {error}") };
         assert_eq!(pointer, "/buffers/0/uri", "{uri}");
-        assert_eq!(external_files(&folder.join("model.gltf")).unwrap_err().exit_code(), 3, "{uri}");
+        assert_eq!(external_files(&folder, &gltf(uri)).unwrap_err().pointer, "/buffers/0/uri", "{uri}");
         // An image is decoration, but its path is not.
         let mut model = Model::triangle();
         model.push("images", json!({"uri": uri}));
@@ -164,9 +170,18 @@ fn harmless_oddities_of_a_glb() {
     let length = (bytes.len() as u32).to_le_bytes();
     bytes[8..12].copy_from_slice(&length);
     load_bytes("model.glb", &bytes).unwrap();
-    // Up to three bytes of padding behind the buffer.
+    // JSON padded with zeros, and up to three bytes of padding behind the buffer.
     let mut model = model;
     model.json["buffers"][0]["byteLength"] = json!(36);
     model.bin.extend([0; 3]);
-    load_bytes("model.glb", &glb(model.text().as_bytes(), &model.bin)).unwrap();
+    let text = format!("{}\0\0", model.text());
+    load_bytes("model.glb", &glb(text.as_bytes(), &model.bin)).unwrap();
+    // The same without padding, the chunk's length not a multiple of four.
+    let mut bytes = glb(model.text().as_bytes(), &model.bin);
+    bytes.pop();
+    let length = bytes.len() as u32;
+    bytes[8..12].copy_from_slice(&length.to_le_bytes());
+    let at = bytes.len() - 39 - 8;
+    bytes[at..at + 4].copy_from_slice(&39_u32.to_le_bytes());
+    load_bytes("model.glb", &bytes).unwrap();
 }

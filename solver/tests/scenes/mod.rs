@@ -11,7 +11,7 @@ use shadowfit_solver::{
     receivers::{ReceiverOptions, Receivers, sample},
     rectangle::Turn,
     sampling::uniform,
-    selection::{Selection, SelectionOptions, select},
+    selection::{Selection, SelectionOptions, Verdict, select},
     visibility::{Pairs, trace},
 };
 use std::f64::consts::TAU;
@@ -34,10 +34,12 @@ pub fn fit_options(max_planes: usize, seed: u64) -> FitOptions {
         selection: SelectionOptions {
             max_planes,
             min_gain: 0.005,
+            scoring_pairs: [60_000, 100_000],
             texels: 64,
             screening_pairs: 4_000,
             finalists: 8,
             refined: 2,
+            polished: 1,
             refine_steps: 6,
             replace_rounds: 1,
         },
@@ -68,7 +70,7 @@ pub fn pairs(mesh: &Mesh, sampling: &Sampling) -> Pairs {
 /// Searches planes for `pairs` and bakes them with the same pairs.
 pub fn fit(mesh: &Mesh, pairs: &Pairs, options: &FitOptions) -> (Selection, Vec<BakedPlane>) {
     let candidates = generate(mesh, &options.candidates);
-    let selection = select(mesh, pairs, &candidates, &options.selection, &mut |_| {});
+    let selection = select(mesh, pairs, &candidates, &options.selection, &mut |_| Verdict::Continue);
     let baked = bake(pairs, &selection.planes, &options.bake);
     (selection, baked)
 }

@@ -2,11 +2,18 @@
 //!
 //! Source: glTF 2.0 specification, section 4 ("GLB File Format Specification"). Every length is checked before it
 //! is used. Splitting and joining keeps the bytes of every chunk; only padding may grow.
+//!
+//! Read although the specification forbids it: bytes after the length in the header, a tail too short for a
+//! chunk, chunk lengths that are no multiple of four (the next chunk follows without a gap, as in three.js), and
+//! JSON padded with zeros.
+//!
+//! Not `gltf::binary::Glb`: it loses or refuses the other chunks, lets chunks reach past the length in the
+//! header, subtracts without a check where that length is below 12, and cuts the length of a file above 4 GiB.
 
 /// First four bytes of a GLB file.
 pub const MAGIC: &[u8; 4] = b"glTF";
-const CHUNK_JSON: u32 = 0x4E4F_534A;
-const CHUNK_BIN: u32 = 0x004E_4942;
+const CHUNK_JSON: u32 = u32::from_le_bytes(*b"JSON");
+const CHUNK_BIN: u32 = u32::from_le_bytes(*b"BIN\0");
 const HEADER_BYTES: usize = 12;
 const CHUNK_HEADER_BYTES: usize = 8;
 
@@ -27,24 +34,22 @@ pub struct Chunks<'a> {
 /// What is wrong with the container, as a sentence.
 pub fn split(bytes: &[u8]) -> Result<Chunks<'_>, String> {
     if !bytes.starts_with(MAGIC) {
-        return Err("not a GLB file: the first four bytes are not \"glTF\"".into());
+        return Err("the file does not start with `glTF`".into());
     }
-    let version = u32_at(bytes, 4).ok_or("the GLB header is cut off")?;
-    if version != 2 {
-        return Err(format!("GLB version {version}, only version 2 is read: convert it with gltf-pipeline"));
-    }
-    let length = u32_at(bytes, 8).ok_or("the GLB header is cut off")? as usize;
-    if length != bytes.len() {
-        return Err(format!("the GLB header says {length} bytes, the file has {}", bytes.len()));
-    }
-    let mut chunks = chunk_list(bytes)?.into_iter();
-    let json = match chunks.next() {
-        Some((CHUNK_JSON, json)) => std::str::from_utf8(json).map_err(|e| format!("the JSON chunk: {e}"))?,
-        _ => return Err("the first GLB chunk is not JSON".into()),
+    let (Some(version), Some(length)) = (u32_at(bytes, 4), u32_at(bytes, 8)) else {
+        return Err(format!("{} bytes are less than the header's {HEADER_BYTES}", bytes.len()));
     };
+    if version != 2 {
+        return Err(format!("version {version}, but 2 is read: convert it with `npx gltf-pipeline -i IN -o OUT`"));
+    }
+    let Some(inside) = bytes.get(..length as usize) else {
+        return Err(format!("the header says {length} bytes, but the file has {}", bytes.len()));
+    };
+    let mut chunks = chunk_list(inside)?.into_iter();
+    let Some((CHUNK_JSON, json)) = chunks.next() else { return Err("the first chunk is not JSON".into()) };
+    let json = std::str::from_utf8(json).map_err(|error| format!("the JSON is not UTF-8: {error}"))?;
     let mut others: Vec<(u32, &[u8])> = chunks.collect();
-    let bin = (others.first().map(|c| c.0) == Some(CHUNK_BIN)).then(|| others.remove(0).1);
-    // Some writers pad with zero bytes where the format asks for spaces.
+    let bin = (others.first().map(|chunk| chunk.0) == Some(CHUNK_BIN)).then(|| others.remove(0).1);
     Ok(Chunks { json: json.trim_end_matches([' ', '\0']), bin, others })
 }
 
@@ -52,14 +57,13 @@ pub fn split(bytes: &[u8]) -> Result<Chunks<'_>, String> {
 fn chunk_list(bytes: &[u8]) -> Result<Vec<(u32, &[u8])>, String> {
     let mut chunks = Vec::new();
     let mut at = HEADER_BYTES;
-    while at < bytes.len() {
-        let cut = || format!("GLB chunk {} is cut off", chunks.len());
-        let length = u32_at(bytes, at).ok_or_else(cut)? as usize;
-        let kind = u32_at(bytes, at + 4).ok_or_else(cut)?;
-        let start = at + CHUNK_HEADER_BYTES;
-        let end = start.checked_add(length).ok_or_else(cut)?;
-        chunks.push((kind, bytes.get(start..end).ok_or_else(cut)?));
-        at = end;
+    while let (Some(size), Some(kind)) = (u32_at(bytes, at), u32_at(bytes, at + 4)) {
+        let left = bytes.get(at + CHUNK_HEADER_BYTES..).unwrap_or_default();
+        let Some(contents) = left.get(..size as usize) else {
+            return Err(format!("chunk {} says {size} bytes, but {} are left", chunks.len(), left.len()));
+        };
+        chunks.push((kind, contents));
+        at += CHUNK_HEADER_BYTES + contents.len();
     }
     Ok(chunks)
 }
