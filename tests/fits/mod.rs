@@ -35,12 +35,12 @@ pub fn request(model: &Path, out_dir: &Path, effort: Effort) -> FitRequest {
 
 /// The least that still fits planes: for models of some dozen triangles, and where only the outcome counts.
 pub fn least() -> Effort {
-    let fast = Effort::fast();
-    let mut candidates = fast.candidates;
+    let mut effort = Effort::fast();
+    let (candidates, selection) = (&mut effort.candidates, &mut effort.selection);
     (candidates.directions, candidates.offsets, candidates.surface_points) = (60, 8, 100);
-    let mut selection = fast.selection;
     (selection.texels, selection.finalists, selection.refined) = (48, 12, 2);
-    Effort { receivers: 8192, lights: 96, candidates, selection, texture_size: 64, ..fast }
+    (effort.receivers, effort.lights, effort.texture_size) = (8192, 96, 64);
+    effort
 }
 
 /// Runs a fit; what it wrote must read back.
