@@ -1,6 +1,6 @@
 //! What is printed: help, table, report.
 
-use crate::program::{fit, model, number, report, run};
+use crate::program::{bake_plate, fit, model, number, report, run};
 use serde_json::Value;
 use std::{collections::BTreeSet, path::Path};
 
@@ -162,7 +162,7 @@ fn the_table_names_what_matters_and_the_files_are_there() {
     let outcome = fit(&model("plate_over_ground"), folder.path(), &["--validate", "short"]);
     // The option stands twice: clap must say so rather than take one of them.
     outcome.refused(1, &["--validate"]);
-    let outcome = fit(&model("plate_over_ground"), folder.path(), &[]).ok();
+    let outcome = bake_plate(&model("plate_over_ground"), folder.path()).ok();
     for word in ["planes", "lookups", "shadow_error", "missed", "false", "worst light", "texture", "seconds", "files"] {
         assert!(outcome.stdout.contains(word), "no {word:?} in {outcome:?}");
     }

@@ -1,6 +1,6 @@
 //! An input is never overwritten, whatever the output is called.
 
-use crate::program::{contents, fit, model, planes, run, small_asset};
+use crate::program::{bake_plate, contents, fit, model, plane_file, planes, run, small_asset};
 use std::{fs, path::Path};
 
 /// A copy of a small model in a fresh folder.
@@ -17,7 +17,7 @@ fn the_output_folder_may_be_the_inputs_own() {
     let before = fs::read(&input).unwrap();
     // Twice: the second run finds the first one's files.
     for _ in 0..2 {
-        fit(&input, folder.path(), &["--texture-size", "32"]).ok();
+        bake_plate(&input, folder.path()).ok();
         assert_eq!(fs::read(&input).unwrap(), before);
         assert_eq!(planes(folder.path(), "plate").planes.len(), 1);
         assert_eq!(contents(folder.path()).len(), 5, "model, sidecar, atlas, report beside the input");
@@ -35,14 +35,14 @@ fn links_do_not_lead_to_the_input() {
     let before = fs::read(&input).unwrap();
     let [linked, out] = ["linked", "out"].map(|name| folder.path().join(name));
     symlink(folder.path(), &linked).unwrap();
-    fit(&input, &linked, &["--texture-size", "32"]).ok();
+    bake_plate(&input, &linked).ok();
     assert_eq!(fs::read(&input).unwrap(), before);
     assert_eq!(planes(folder.path(), "plate").planes.len(), 1);
     // Every name that a fit writes, as another name of the input.
     for name in ["plate.shadow.glb", "plate.shadow.json", "plate.atlas-0.png", "plate.report.json"] {
         fs::create_dir(&out).unwrap();
         fs::hard_link(&input, out.join(name)).unwrap();
-        fit(&input, &out, &["--texture-size", "32"]).refused(2, &[name, "never overwritten"]);
+        bake_plate(&input, &out).refused(2, &[name, "never overwritten"]);
         assert_eq!(contents(&out).into_iter().collect::<Vec<_>>(), [(name.to_owned(), before.clone())]);
         fs::remove_dir_all(&out).unwrap();
     }
@@ -51,7 +51,7 @@ fn links_do_not_lead_to_the_input() {
 #[test]
 fn a_plane_file_is_an_input_too() {
     let folder = tempfile::tempdir().unwrap();
-    let by_hand = model("plate_over_ground").with_file_name("planes/plate_over_ground.planes.json");
+    let by_hand = plane_file("plate_over_ground");
     for name in ["plate_over_ground.shadow.json", "plate_over_ground.report.json"] {
         let planes = folder.path().join(name);
         fs::copy(&by_hand, &planes).unwrap();

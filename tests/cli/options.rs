@@ -1,6 +1,6 @@
 //! Every option of `fit` has its effect.
 
-use crate::program::{fit, model, number, planes, report};
+use crate::program::{fit, model, number, plane_file, planes, report};
 use serde_json::Value;
 use std::{fs, path::Path};
 
@@ -98,9 +98,9 @@ fn planes_placed_by_hand_are_baked_where_they_are() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/planes");
     assert_eq!(fs::read_dir(&folder).unwrap().count(), BY_HAND.len(), "a plane file without a test");
     for (file, name, count, limit) in BY_HAND {
-        let path = folder.join(format!("{file}.planes.json"));
+        let path = plane_file(file);
         let given: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
-        let (folder, report) = fitted(name, &["--planes", path.to_str().unwrap(), "--texture-size", "64"]);
+        let (folder, report) = fitted(name, &["--planes", &path, "--texture-size", "64"]);
         assert_eq!(number(&report, "/planes") as usize, count, "{file}");
         let error = number(&report, "/held_out/shadow_error");
         assert!(error < limit, "{file}: {error}");
@@ -155,11 +155,11 @@ fn plane_files_that_are_wrong_end_with_3() {
 fn outputs_for_the_khronos_validator() {
     // `tests/khronos/validate.mjs` is run on these files by ./test: without planes, with one, with eleven.
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("khronos/cli");
-    let by_hand = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/planes/teapot-by-hand.planes.json");
+    let [plate, teapot] = ["plate_over_ground", "teapot-by-hand"].map(plane_file);
     for (name, more) in [
         ("box", &[][..]),
-        ("plate_over_ground", &["--texture-size", "32"]),
-        ("teapot", &["--planes", by_hand.to_str().unwrap(), "--texture-size", "32"]),
+        ("plate_over_ground", &["--planes", &plate, "--texture-size", "32"]),
+        ("teapot", &["--planes", &teapot, "--texture-size", "32"]),
     ] {
         fit(&model(name), &folder.join(name), more).ok();
     }

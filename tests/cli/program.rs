@@ -85,9 +85,19 @@ pub fn model(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("models").join(format!("{name}.glb"))
 }
 
-/// Makes `name` in a folder and fits it: what a model whose fit takes a second leaves.
+/// A plane file of the repository.
+pub fn plane_file(name: &str) -> String {
+    model("planes").with_file_name(format!("planes/{name}.planes.json")).to_str().unwrap().to_owned()
+}
+
+/// A fit of a copy of the plate over its ground whose planes are given: the quickest that leaves all files.
+pub fn bake_plate(model: &Path, out: &Path) -> Outcome {
+    fit(model, out, &["--texture-size", "32", "--planes", &plane_file("plate_over_ground")])
+}
+
+/// Such an asset in a folder.
 pub fn small_asset(folder: &Path) -> PathBuf {
-    fit(&model("plate_over_ground"), folder, &["--texture-size", "32"]).ok();
+    bake_plate(&model("plate_over_ground"), folder).ok();
     folder.join("plate_over_ground.shadow.glb")
 }
 
