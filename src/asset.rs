@@ -22,7 +22,7 @@ mod write;
 
 pub use atlas::Channel;
 pub use read::{ModelRectangle, read, read_plane_file};
-pub use write::{AssetRequest, Written, WrittenAtlas, check_input, write};
+pub use write::{AssetRequest, Written, WrittenAtlas, check_input, check_outputs, write};
 
 use crate::gltf_file::Invalid;
 use glam::DVec3;

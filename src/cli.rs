@@ -1,7 +1,7 @@
 //! The command line: raw arguments, checked into requests, run, and answered with an exit code.
 
 use crate::{
-    asset,
+    asset::{self, AssetError},
     effort::Effort,
     pipeline::{self, FitError, FitRequest},
     render::{Antialias, Camera, FrameOptions, FrameRequest, Light, Mode, RenderError, cpu, gpu::Gpu, turntable},
@@ -235,6 +235,9 @@ fn progress_bar() -> ProgressBar {
 
 /// Draws an asset: with wgpu, or with the CPU twin where there is no adapter.
 fn render(args: &RenderArgs) -> Result<(), CliError> {
+    if asset::files::is_same_file(&args.asset, &args.out) {
+        return Err(FitError::Asset(AssetError::OverwritesInput { path: args.out.clone() }).into());
+    }
     let scene = scene::load(&args.asset).map_err(FitError::Scene)?;
     let mesh = Mesh::new(&scene.soup).map_err(|source| FitError::Mesh { path: args.asset.clone(), source })?;
     let planes = asset::read(&args.asset).map_err(FitError::Asset)?.in_unit_space(&mesh.frame);

@@ -2,11 +2,28 @@
 
 use clap::{Parser, error::ErrorKind};
 use shadowfit::cli::{self, Cli};
-use std::process::ExitCode;
+use std::{
+    io::{IsTerminal, stderr},
+    process::ExitCode,
+};
+use tracing_subscriber::{
+    Layer,
+    filter::{LevelFilter, Targets},
+    fmt,
+    layer::SubscriberExt,
+    util::SubscriberInitExt,
+};
+
+/// Warnings go to stderr. wgpu tries every driver and calls each one that it cannot use an error: whether one of
+/// them draws, the program itself says.
+fn set_up_log() {
+    let filter = Targets::new().with_default(LevelFilter::WARN).with_target("wgpu_hal", LevelFilter::OFF);
+    let to_stderr = fmt::layer().with_writer(stderr).with_ansi(stderr().is_terminal()).without_time();
+    tracing_subscriber::registry().with(to_stderr.with_filter(filter)).init();
+}
 
 fn main() -> ExitCode {
-    let filter = tracing_subscriber::filter::LevelFilter::WARN;
-    tracing_subscriber::fmt().with_max_level(filter).with_writer(std::io::stderr).without_time().init();
+    set_up_log();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {

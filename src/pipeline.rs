@@ -154,7 +154,7 @@ struct Fitted {
 pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Report, FitError> {
     let (start, mut clock, mut time_s) = (Instant::now(), Clock(Instant::now()), Times::default());
     progress(format!("reading {}", request.model.display()));
-    asset::check_input(&request.model)?;
+    check_files(request)?;
     let scene = scene::load(&request.model)?;
     time_s.load = clock.lap();
     let mesh_error = |source| FitError::Mesh { path: request.model.clone(), source };
@@ -217,6 +217,13 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
     };
     write_report(&mut report, out_dir, &stem, proof.picture)?;
     Ok(report)
+}
+
+/// Refuses, before the long search, an input that cannot be extended and an output in the place of an input.
+fn check_files(request: &FitRequest) -> Result<(), AssetError> {
+    asset::check_input(&request.model)?;
+    let inputs: Vec<&Path> = std::iter::once(&request.model).chain(&request.planes).map(PathBuf::as_path).collect();
+    asset::check_outputs(&request.out_dir, &stem_of(&request.model), &inputs)
 }
 
 /// What the written files are worth.

@@ -154,6 +154,20 @@ pub fn check_input(input: &Path) -> Result<(), AssetError> {
     Ok(())
 }
 
+/// Refuses an output folder in which a file of the fit would take the place of one of `inputs`. Asked before a long
+/// search; [`write()`] knows of the model's buffers and images too.
+///
+/// # Errors
+/// [`AssetError::OverwritesInput`].
+pub fn check_outputs(out_dir: &Path, stem: &str, inputs: &[&Path]) -> Result<(), AssetError> {
+    let outputs = Outputs { folder: out_dir, stem };
+    let taken = |path: &PathBuf| inputs.iter().any(|input| files::is_same_file(path, input));
+    match outputs.but_atlases().into_iter().chain([outputs.atlas(0)]).find(taken) {
+        Some(path) => Err(AssetError::OverwritesInput { path }),
+        None => Ok(()),
+    }
+}
+
 /// Output paths.
 struct Outputs<'a> {
     folder: &'a Path,
@@ -178,13 +192,19 @@ impl<'a> Outputs<'a> {
         self.folder.join(format!("{}.shadow.json", self.stem))
     }
 
+    /// What a fit writes beside the atlases: by this module, and by the report.
+    fn but_atlases(&self) -> [PathBuf; 4] {
+        let other = |ending: &str| self.folder.join(format!("{}.{ending}", self.stem));
+        [self.model(), self.sidecar(), other("report.json"), other("compare.png")]
+    }
+
     fn atlas(&self, index: usize) -> PathBuf {
         self.folder.join(atlas_name(self.stem, index))
     }
 
     /// No output may be a file of the input, nor take the place of a copy of one.
     fn refuse_overwriting(&self, input: &Path, externals: &[External], atlases: &[PathBuf]) -> Result<(), AssetError> {
-        for path in [self.model(), self.sidecar()].iter().chain(atlases) {
+        for path in self.but_atlases().iter().chain(atlases) {
             let is_copy = externals.iter().any(|external| self.folder.join(&external.relative) == *path);
             let is_source = externals.iter().any(|external| files::is_same_file(path, &external.path));
             if is_copy || is_source || files::is_same_file(path, input) {

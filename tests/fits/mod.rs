@@ -1,0 +1,78 @@
+//! Fits through the library, for tests that look at results rather than at the program.
+
+pub use shadowfit::pipeline::FitRequest;
+use shadowfit::{
+    asset::{ShadowSet, read},
+    effort::Effort,
+    pipeline::{FitError, run},
+    report::Report,
+};
+use shadowfit_solver::lights::LightDomain;
+use std::path::{Path, PathBuf};
+
+/// A file of `models/`.
+pub fn model(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("models").join(name)
+}
+
+/// A fit of `model` into `out_dir`, without frames.
+pub fn request(model: &Path, out_dir: &Path, effort: Effort) -> FitRequest {
+    FitRequest {
+        model: model.to_owned(),
+        out_dir: out_dir.to_owned(),
+        effort,
+        max_planes: None,
+        max_error: None,
+        texture_size: None,
+        domain: LightDomain::Sphere,
+        domain_text: "sphere".to_owned(),
+        planes: None,
+        validation: None,
+        seed: 1,
+        command: String::new(),
+    }
+}
+
+/// The least that still fits planes: for models of some dozen triangles, and where only the outcome counts.
+pub fn least() -> Effort {
+    let mut effort = Effort::fast();
+    let (candidates, selection) = (&mut effort.candidates, &mut effort.selection);
+    (candidates.directions, candidates.offsets, candidates.surface_points) = (60, 8, 100);
+    (selection.texels, selection.finalists, selection.refined) = (48, 12, 2);
+    (effort.receivers, effort.lights, effort.texture_size) = (8192, 96, 64);
+    effort
+}
+
+/// Runs a fit; what it wrote must read back.
+pub fn fit(request: &FitRequest) -> Result<(Report, ShadowSet), FitError> {
+    let report = run(request, &mut |_| ())?;
+    let stem = request.model.file_stem().unwrap().to_str().unwrap();
+    let [model, sidecar] = ["glb", "json"].map(|kind| request.out_dir.join(format!("{stem}.shadow.{kind}")));
+    let set = read(&model).unwrap();
+    assert_eq!(read(&sidecar).unwrap(), set, "{}", model.display());
+    assert_eq!(set.planes.len(), report.planes);
+    assert_finite(&serde_json::to_value(&report).unwrap(), &set);
+    Ok((report, set))
+}
+
+/// JSON has no NaN: serde writes `null` in its place, which only these members may be.
+fn assert_finite(report: &serde_json::Value, set: &ShadowSet) {
+    const MAY_BE_NULL: [&str; 4] = ["image", "certificate", "peak_memory_bytes", "max_error"];
+    let mut open = vec![(String::new(), report)];
+    while let Some((name, value)) = open.pop() {
+        match value {
+            serde_json::Value::Null => assert!(MAY_BE_NULL.contains(&name.as_str()), "{name} is no number"),
+            serde_json::Value::Array(list) => open.extend(list.iter().map(|value| (name.clone(), value))),
+            serde_json::Value::Object(members) => {
+                open.extend(members.iter().map(|(name, value)| (name.clone(), value)));
+            }
+            _ => {}
+        }
+    }
+    assert!(set.bounds.min.is_finite() && set.bounds.max.is_finite(), "{:?}", set.bounds);
+    for plane in &set.planes {
+        let rectangle = &plane.rectangle;
+        let vectors = [rectangle.origin, rectangle.u_axis, rectangle.v_axis];
+        assert!(vectors.iter().all(|v| v.is_finite()) && plane.bias.is_finite(), "{rectangle:?}");
+    }
+}

@@ -1,0 +1,17 @@
+//! Models that break what is taken for granted: far away, tiny, huge, flat, doubled, mirrored, hidden, empty, wrong.
+//! Each must end with a sound asset that is as good as that of the plain model, or with the right refusal.
+
+#![allow(clippy::unwrap_used, reason = "clippy sees only #[test] functions as tests, not what they call")]
+
+#[allow(dead_code, reason = "shared with tests/scene.rs, which uses more of it")]
+#[path = "scene/build.rs"]
+mod build;
+mod fits;
+#[path = "hard_cases/lights.rs"]
+mod lights;
+#[path = "hard_cases/placement.rs"]
+mod placement;
+#[path = "hard_cases/shapes.rs"]
+mod shapes;
+#[path = "hard_cases/surfaces.rs"]
+mod surfaces;
