@@ -13,7 +13,7 @@ use crate::{
     plane::{BakedPlane, OccluderTexture, ShadowPlane},
     rectangle::{Turn, tighten},
     visibility::{LightPairs, Pairs},
-    votes::{BIAS, Mask, smoothed, sum_votes},
+    votes::{BIAS, Mask, fill_unvoted, smoothed, sum_votes},
 };
 use rayon::prelude::*;
 
@@ -94,6 +94,7 @@ fn rebake(pairs: &Pairs, covers: &mut Covers, mask: &mut Mask, smoothing: usize)
     for _ in 0..smoothing {
         votes = smoothed(&votes, mask.width);
     }
+    fill_unvoted(&mut votes, mask.width);
     let mut next = Mask::open(mask.plane, mask.side, mask.width, mask.height);
     for y in 1..mask.height - 1 {
         for x in 1..mask.width - 1 {

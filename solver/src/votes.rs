@@ -171,6 +171,38 @@ pub(crate) fn smoothed(votes: &[f32], width: usize) -> Vec<f32> {
     out
 }
 
+/// Gives texels without a vote the votes of their surroundings: where few receivers or nearly one light leave most
+/// texels uncrossed, the texture would be full of holes. Votes are summed 2 x 2 until every texel has one, and
+/// interpolated back (the pull-push of Gortler et al., "The Lumigraph", 1996). Other texels stay as they are.
+pub(crate) fn fill_unvoted(votes: &mut [f32], width: usize) {
+    let height = votes.len() / width;
+    if width.max(height) == 1 || votes.iter().all(|v| *v != 0.0) || votes.iter().all(|v| *v == 0.0) {
+        return;
+    }
+    // Pull: a texel of the coarser level is the mean of four.
+    let (coarse_width, coarse_height) = (width.div_ceil(2), height.div_ceil(2));
+    let mut coarse = vec![0.0f32; coarse_width * coarse_height];
+    for y in 0..height {
+        for x in 0..width {
+            coarse[y / 2 * coarse_width + x / 2] += 0.25 * votes[y * width + x];
+        }
+    }
+    fill_unvoted(&mut coarse, coarse_width);
+    // Push: bilinear, 3/4 of the texel's own parent and 1/4 of the neighbour on its side, along each axis.
+    let neighbour = |i: usize, n: usize| if i % 2 == 0 { (i / 2).saturating_sub(1) } else { (i / 2 + 1).min(n - 1) };
+    for y in 0..height {
+        for x in 0..width {
+            if votes[y * width + x] == 0.0 {
+                let row = |y: usize| {
+                    0.75 * coarse[y * coarse_width + x / 2]
+                        + 0.25 * coarse[y * coarse_width + neighbour(x, coarse_width)]
+                };
+                votes[y * width + x] = 0.75 * row(y / 2) + 0.25 * row(neighbour(y, coarse_height));
+            }
+        }
+    }
+}
+
 /// Sums of the votes per texel (plus the one for "outside") over the pairs for which `counts(light, pair, texel)`.
 pub fn sum_votes(pairs: &Pairs, mask: &Mask, counts: impl Fn(usize, usize, usize) -> bool + Sync) -> Vec<f32> {
     let partial = |(task, lights): (usize, &[LightPairs])| {
