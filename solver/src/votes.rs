@@ -189,7 +189,8 @@ pub(crate) fn fill_unvoted(votes: &mut [f32], width: usize) {
     }
     fill_unvoted(&mut coarse, coarse_width);
     // Push: bilinear, 3/4 of the texel's own parent and 1/4 of the neighbour on its side, along each axis.
-    let neighbour = |i: usize, n: usize| if i % 2 == 0 { (i / 2).saturating_sub(1) } else { (i / 2 + 1).min(n - 1) };
+    let neighbour =
+        |i: usize, n: usize| if i.is_multiple_of(2) { (i / 2).saturating_sub(1) } else { (i / 2 + 1).min(n - 1) };
     for y in 0..height {
         for x in 0..width {
             if votes[y * width + x] == 0.0 {
