@@ -31,7 +31,6 @@ impl Effort {
                 finalists: 48,
                 refined: 3,
                 replace_rounds: 0,
-                kicks: 0,
                 ..base.selection
             },
             texture_size: 128,
@@ -57,7 +56,6 @@ impl Effort {
                 polished: 2,
                 refine_steps: 5,
                 replace_rounds: 1,
-                kicks: 1,
             },
             texture_size: 256,
         }
@@ -75,8 +73,7 @@ impl Effort {
                 scoring_pairs: [400_000, 600_000],
                 refined: 8,
                 refine_steps: 6,
-                replace_rounds: 2,
-                kicks: 4,
+                replace_rounds: 4,
                 ..base.selection
             },
             ..base

@@ -22,7 +22,7 @@ use shadowfit_solver::{
     selection::{SelectionOptions, Verdict, select},
     shade::plane_rows,
     visibility::{Pairs, trace},
-    votes::Mask,
+    votes::{Mask, best_bias},
 };
 use std::{
     io::Cursor,
@@ -269,7 +269,11 @@ fn fit(
     if let Some(path) = &request.planes {
         let by_hand: Vec<Mask> = asset::read_plane_file(path)?
             .iter()
-            .map(|plane| Mask::open(plane.rectangle.in_unit_space(&mesh.frame), plane.side, 1, 1))
+            .map(|given| {
+                let plane = given.rectangle.in_unit_space(&mesh.frame);
+                let (bias, _) = best_bias(pairs, &plane, request.effort.selection.texels);
+                Mask::open(plane, given.side, bias, 1, 1)
+            })
             .collect();
         time_s.search = clock.lap();
         let planes = bake(pairs, &by_hand, &BakeOptions { turn: Turn::Fixed, ..options });

@@ -16,7 +16,7 @@ use shadowfit_solver::{
     plane::ShadowPlane,
     selection::{Verdict, select},
     visibility::trace,
-    votes::score,
+    votes::{BIAS, score},
 };
 use std::hint::black_box;
 
@@ -50,7 +50,7 @@ fn pair_evaluations(c: &mut Criterion) {
     let plane = ShadowPlane { origin: -(u + v), u: u * 2.0, v: v * 2.0 };
     for texels in [32, 64, 128] {
         group.bench_function(format!("{name}, {texels} texels"), |b| {
-            b.iter(|| score(&pairs, black_box(&plane), texels))
+            b.iter(|| score(&pairs, black_box(&plane), BIAS, texels))
         });
     }
 }

@@ -13,7 +13,7 @@ use crate::{
     plane::{BakedPlane, OccluderTexture, ShadowPlane},
     rectangle::{Turn, tighten},
     visibility::{LightPairs, Pairs},
-    votes::{BIAS, Mask, fill_unvoted, smoothed, sum_votes},
+    votes::{Mask, fill_unvoted, smoothed, sum_votes},
 };
 use rayon::prelude::*;
 
@@ -57,14 +57,14 @@ pub fn bake(pairs: &Pairs, planes: &[Mask], options: &BakeOptions) -> Vec<BakedP
 /// The plane's rectangle, tight around what blocks in it, with an open texture of the final size.
 fn fit_rectangle(pairs: &Pairs, covers: &Covers, plane: &Mask, options: &BakeOptions) -> Option<Mask> {
     let (width, height) = texture_shape(&plane.plane, options.texture_size);
-    let mut rough = Mask::open(plane.plane, plane.side, width, height);
+    let mut rough = Mask::open(plane.plane, plane.side, plane.bias, width, height);
     let votes = open_votes(pairs, covers, &rough);
     for (blocked, vote) in rough.blocked.iter_mut().zip(&votes[..width * height]) {
         *blocked = u8::from(*vote > 0.0);
     }
     let tight = tighten(pairs, &rough, options.turn)?;
     let (width, height) = texture_shape(&tight, options.texture_size);
-    Some(Mask::open(with_ring(&tight, width, height), plane.side, width, height))
+    Some(Mask::open(with_ring(&tight, width, height), plane.side, plane.bias, width, height))
 }
 
 /// Square texels, `texture_size` along the longer side, at least one inside the open ring.
@@ -95,7 +95,7 @@ fn rebake(pairs: &Pairs, covers: &mut Covers, mask: &mut Mask, smoothing: usize)
         votes = smoothed(&votes, mask.width);
     }
     fill_unvoted(&mut votes, mask.width);
-    let mut next = Mask::open(mask.plane, mask.side, mask.width, mask.height);
+    let mut next = Mask::open(mask.plane, mask.side, mask.bias, mask.width, mask.height);
     for y in 1..mask.height - 1 {
         for x in 1..mask.width - 1 {
             let i = y * mask.width + x;
@@ -113,7 +113,7 @@ fn baked(mask: &Mask) -> BakedPlane {
     let texels = mask.width * mask.height;
     let coverage = mask.blocked[..texels].iter().map(|&b| b * u8::MAX).collect();
     let texture = OccluderTexture { width: mask.width, height: mask.height, coverage };
-    BakedPlane { plane: mask.plane, texture, side: mask.side, bias: BIAS }
+    BakedPlane { plane: mask.plane, texture, side: mask.side, bias: mask.bias }
 }
 
 impl Default for BakeOptions {

@@ -6,11 +6,11 @@
 //! refined continuously (compass search over two tilts and the offset) on all. Then *replace* rounds take each plane
 //! out, search again and keep what is better; last, planes that no longer pay are dropped.
 //!
-//! Tried and left out (teapot, 11 planes, seeds 1 and 2, held-out error): candidates through the blockers of
-//! unexplained pairs at each pick (0.196, 0.192 against 0.191, 0.178 without), screening at 64 instead of 32 texels
-//! (0.185, 0.201 against 0.189, 0.191), four planes too many and then the least useful taken out (0.191, 0.195, at
-//! twice the time). Runs differ by more than these do: what they share is a local optimum that exchanging one plane
-//! at a time does not leave.
+//! Tried and left out (teapot, 11 planes, held-out error before biases were chosen per plane): candidates through the
+//! blockers of unexplained pairs at each pick (0.196, 0.192 with seeds 1 and 2, against 0.191, 0.178 without);
+//! screening at 64 instead of 32 texels (0.185, 0.201 against 0.189, 0.191); four planes too many, then the least
+//! useful taken out (0.191, 0.195, at twice the time); three random planes taken out together and searched anew, kept
+//! where better, three times (0.199, 0.167, at three times the time).
 //!
 //! Guaranteed: the result depends on the input alone, not on threads. Not guaranteed: optimality.
 
@@ -19,9 +19,8 @@ use crate::{
     mesh::Mesh,
     plane::ShadowPlane,
     rectangle::{Turn, around_section, tighten},
-    sampling::hash,
     visibility::Pairs,
-    votes::{Mask, best_mask, error, score, thinned, uncovered},
+    votes::{BIAS, Mask, best_bias, best_mask, score, thinned, uncovered},
 };
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
@@ -51,8 +50,6 @@ pub struct SelectionOptions {
     pub refine_steps: usize,
     /// Replace rounds; each costs about as much as the greedy search.
     pub replace_rounds: usize,
-    /// Times that some planes are taken out together and searched anew; each costs a little more than a replace round.
-    pub kicks: usize,
 }
 
 /// What the caller says to a set of planes.
@@ -79,9 +76,6 @@ pub struct Selection {
 
 /// A replacement must gain this much more (relative): less is noise and would never settle.
 const REPLACE_MARGIN: f64 = 1e-3;
-
-/// Planes that a kick takes out together.
-const KICKED: usize = 3;
 
 /// Stale candidates are re-scored in batches of this size, in parallel. Fixed, so that the outcome does not
 /// depend on the number of threads.
@@ -143,9 +137,6 @@ pub fn select(
             break;
         }
     }
-    for kick in 0..options.kicks {
-        replaced += search.kick(&mut planes, kick as u64);
-    }
     let mut dropped = search.drop_unpaid(&mut planes);
     if verdict == Verdict::Enough {
         dropped += search.shrink(&mut planes, judge);
@@ -183,7 +174,7 @@ impl Search<'_> {
             let others: Vec<&Mask> = planes.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, m)| m).collect();
             let open = uncovered(self.pairs, &others);
             let mut bounds = vec![f64::INFINITY; self.candidates.len()];
-            let kept = score(&open, &planes[k].plane, self.options.texels);
+            let kept = score(&open, &planes[k].plane, planes[k].bias, self.options.texels);
             let found = self.best_plane(&open, &mut bounds, Some(&planes[k].plane));
             planes[k] = match found {
                 Some((gain, mask)) if gain > kept.gain * (1.0 + REPLACE_MARGIN) => {
@@ -191,42 +182,17 @@ impl Search<'_> {
                     mask
                 }
                 // The others have moved: the same rectangle, its texture decided anew.
-                _ => best_mask(&open, &planes[k].plane, kept.side, self.options.texels),
+                _ => best_mask(&open, &planes[k].plane, kept.side, planes[k].bias, self.options.texels),
             };
         }
         exchanges
-    }
-
-    /// Takes [`KICKED`] planes out together, fills up, lets all planes move once, and keeps what is better: leaves
-    /// local optima that exchanging one plane at a time does not (iterated local search). Returns 1 where it did.
-    fn kick(&self, planes: &mut Vec<Mask>, seed: u64) -> usize {
-        let count = planes.len();
-        if count <= KICKED {
-            return 0;
-        }
-        let mut trial = planes.clone();
-        for k in 0..KICKED {
-            trial.remove((hash(seed, k as u64) % trial.len() as u64) as usize);
-        }
-        while trial.len() < count {
-            let open = uncovered(self.pairs, &trial.iter().collect::<Vec<_>>());
-            let mut bounds = vec![f64::INFINITY; self.candidates.len()];
-            let Some((_, mask)) = self.best_plane(&open, &mut bounds, None) else { break };
-            trial.push(mask);
-        }
-        self.replace_round(&mut trial);
-        let better = error(self.pairs, &trial) < error(self.pairs, planes);
-        if better {
-            *planes = trial;
-        }
-        usize::from(better)
     }
 
     /// What each plane gains given the others.
     fn gains(&self, planes: &[Mask]) -> Vec<f64> {
         let gain = |k: usize| {
             let others: Vec<&Mask> = planes.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, m)| m).collect();
-            score(&uncovered(self.pairs, &others), &planes[k].plane, self.options.texels).gain
+            score(&uncovered(self.pairs, &others), &planes[k].plane, planes[k].bias, self.options.texels).gain
         };
         (0..planes.len()).map(gain).collect()
     }
@@ -271,17 +237,17 @@ impl Search<'_> {
         let wide = |i: &usize| {
             let candidate = &self.candidates[*i];
             let plane = self.around(candidate.normal, candidate.offset)?;
-            Some((score(open, &plane, self.options.texels).gain, plane))
+            Some((score(open, &plane, BIAS, self.options.texels).gain, plane))
         };
         let scored = distinct(screened.par_iter().filter_map(wide).collect(), self.options.refined);
         let refined = scored.par_iter().map(|(gain, plane)| {
-            self.compass(open, *gain, *plane, FIRST_TILT, |moved| {
+            self.compass(open, (*gain, *plane), BIAS, FIRST_TILT, |moved| {
                 self.around(moved.normal(), moved.normal().dot(moved.origin))
             })
         });
         let refined = distinct(refined.collect(), self.options.polished);
         let rectangles: Vec<ShadowPlane> =
-            refined.par_iter().filter_map(|(_, plane)| self.tight(open, plane)).collect();
+            refined.par_iter().filter_map(|(_, plane)| self.tight(open, plane, BIAS)).collect();
         let rectangles: Vec<ShadowPlane> = rectangles.into_iter().chain(start.copied()).collect();
         let polished: Vec<(f64, Mask)> = rectangles.par_iter().filter_map(|plane| self.polish(open, plane)).collect();
         polished.into_iter().reduce(|a, b| if b.0 > a.0 { b } else { a })
@@ -312,7 +278,7 @@ impl Search<'_> {
     fn screening_gain(&self, sample: &Pairs, candidate: usize) -> f64 {
         let Candidate { normal, offset, .. } = self.candidates[candidate];
         let plane = self.around(normal, offset);
-        plane.map_or(f64::NEG_INFINITY, |plane| score(sample, &plane, SCREENING_TEXELS).gain)
+        plane.map_or(f64::NEG_INFINITY, |plane| score(sample, &plane, BIAS, SCREENING_TEXELS).gain)
     }
 
     /// The rectangle around the model's section.
@@ -321,9 +287,9 @@ impl Search<'_> {
     }
 
     /// The rectangle tight around what the plane blocks.
-    fn tight(&self, open: &Pairs, plane: &ShadowPlane) -> Option<ShadowPlane> {
+    fn tight(&self, open: &Pairs, plane: &ShadowPlane, bias: f32) -> Option<ShadowPlane> {
         let texels = self.options.texels;
-        tighten(open, &best_mask(open, plane, score(open, plane, texels).side, texels), Turn::Free)
+        tighten(open, &best_mask(open, plane, score(open, plane, bias, texels).side, bias, texels), Turn::Free)
     }
 
     /// Moves a rectangle as it is, with some room around it: all texels serve what it blocks, so that small parts
@@ -331,11 +297,11 @@ impl Search<'_> {
     fn polish(&self, open: &Pairs, plane: &ShadowPlane) -> Option<(f64, Mask)> {
         let texels = self.options.texels;
         let roomy = enlarged(plane, POLISH_ROOM);
-        let gain = score(open, &roomy, texels).gain;
-        let (_, moved) = self.compass(open, gain, roomy, FIRST_TILT * POLISH_STEP, Some);
-        let plane = self.tight(open, &moved)?;
-        let tight = score(open, &plane, texels);
-        Some((tight.gain, best_mask(open, &plane, tight.side, texels)))
+        let (bias, scored) = best_bias(open, &roomy, texels);
+        let (_, moved) = self.compass(open, (scored.gain, roomy), bias, FIRST_TILT * POLISH_STEP, Some);
+        let plane = self.tight(open, &moved, bias)?;
+        let (bias, tight) = best_bias(open, &plane, texels);
+        Some((tight.gain, best_mask(open, &plane, tight.side, bias, texels)))
     }
 
     /// Compass search: try a step each way in both tilts and the offset, keep what gains, else halve the step.
@@ -343,8 +309,8 @@ impl Search<'_> {
     fn compass(
         &self,
         open: &Pairs,
-        mut gain: f64,
-        mut at: ShadowPlane,
+        (mut gain, mut at): (f64, ShadowPlane),
+        bias: f32,
         first_tilt: f32,
         window: impl Fn(ShadowPlane) -> Option<ShadowPlane>,
     ) -> (f64, ShadowPlane) {
@@ -353,7 +319,7 @@ impl Search<'_> {
             for direction in 0..3 {
                 for step in [tilt, -tilt] {
                     let Some(moved) = window(shifted(&at, direction, step)) else { continue };
-                    let moved_gain = score(open, &moved, self.options.texels).gain;
+                    let moved_gain = score(open, &moved, bias, self.options.texels).gain;
                     if moved_gain > gain {
                         (gain, at) = (moved_gain, moved);
                         break;

@@ -13,7 +13,7 @@ use shadowfit_solver::{
     receivers::Receivers,
     selection::Selection,
     visibility::trace,
-    votes::Mask,
+    votes::{BIAS, Mask},
 };
 
 const TRAINING: Sampling = Sampling { domain: LightDomain::Hemisphere, receivers: 6_000, lights: 192, seed: 1 };
@@ -75,7 +75,7 @@ fn true_plane(mesh: &Mesh) -> ShadowPlane {
 fn the_true_plane_of_the_plate_explains_its_shadow() {
     let mesh = Mesh::new(&scenes::plate_over_ground()).unwrap();
     let (training, held_out) = (pairs(&mesh, &TRAINING), pairs(&mesh, &HELD_OUT));
-    let given = Mask::open(true_plane(&mesh), Side::Both, 64, 64);
+    let given = Mask::open(true_plane(&mesh), Side::Both, BIAS, 64, 64);
     let baked = bake(&training, &[given], &fit_options(1, 1).bake);
     assert_eq!(baked.len(), 1);
     let metrics = measure(&baked, &held_out);

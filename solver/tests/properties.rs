@@ -57,7 +57,7 @@ fn nearest_texel_error(pairs: &Pairs, masks: &[Mask]) -> f64 {
 /// A baked plane as the votes see it. Nothing is lost: the bake's coverage is binary.
 fn mask_of(baked: &BakedPlane) -> Mask {
     let OccluderTexture { width, height, coverage } = &baked.texture;
-    let mut mask = Mask::open(baked.plane, baked.side, *width, *height);
+    let mut mask = Mask::open(baked.plane, baked.side, baked.bias, *width, *height);
     for (blocked, coverage) in mask.blocked.iter_mut().zip(coverage) {
         assert!(matches!(coverage, 0 | 255), "coverage {coverage}");
         *blocked = coverage / 255;
@@ -78,7 +78,8 @@ fn some_planes(mesh: &Mesh, count: u64) -> Vec<ShadowPlane> {
 fn exact_rebakes_never_raise_the_training_error() {
     let mesh = Mesh::new(&knot_soup()).unwrap();
     let training = pairs(&mesh, &TRAINING);
-    let planes: Vec<Mask> = some_planes(&mesh, 6).into_iter().map(|p| Mask::open(p, Side::Both, 64, 64)).collect();
+    let planes: Vec<Mask> =
+        some_planes(&mesh, 6).into_iter().map(|p| Mask::open(p, Side::Both, BIAS, 64, 64)).collect();
     // Measured with the votes' own nearest-texel lookups: that is the objective of which the step is exact. The
     // shader's bilinear taps differ by half a texel, for which nothing is promised.
     let error = |rounds: usize| {
@@ -113,8 +114,8 @@ fn a_score_is_the_drop_of_the_error_where_both_folds_agree() {
     let pairs = trace(&mesh, &receivers, &domain.directions(48, 2), domain.solid_angle());
     let mut worthwhile = 0;
     for plane in some_planes(&mesh, 24) {
-        let found = score(&pairs, &plane, 32);
-        let mask = best_mask(&pairs, &plane, found.side, 32);
+        let found = score(&pairs, &plane, BIAS, 32);
+        let mask = best_mask(&pairs, &plane, found.side, BIAS, 32);
         let drop = (nearest_texel_error(&pairs, &[]) - nearest_texel_error(&pairs, &[mask])) * pairs.shadow_weight;
         // Sums of some 30,000 votes in f32, in another order; texels that come out at zero count for nothing.
         let tolerance = 1e-4 * found.gain.abs() + 1e-6 * pairs.shadow_weight;
@@ -136,7 +137,7 @@ fn scores_cross_validate_and_choose_the_side() {
     let plane = ShadowPlane { origin: Vec3::new(-1.0, 0.0, -1.0), u: Vec3::Z * 2.0, v: Vec3::X * 2.0 };
     let found = |lights: Vec<LightPairs>| {
         let pairs = Pairs { lights, shadow_weight: 1.0, total_weight: 1.0, receivers: 1 };
-        let score = score(&pairs, &plane, 64);
+        let score = score(&pairs, &plane, BIAS, 64);
         (score.gain, score.side)
     };
     let agree = [(0.3, 1.0), (0.3, 2.0)];
@@ -158,7 +159,7 @@ fn uncovered_pairs_are_those_that_no_mask_blocks() {
     let mesh = Mesh::new(&knot_soup()).unwrap();
     let training = pairs(&mesh, &TRAINING);
     let plane = some_planes(&mesh, 1)[0];
-    let mask = best_mask(&training, &plane, Side::Both, 32);
+    let mask = best_mask(&training, &plane, Side::Both, BIAS, 32);
     let open = uncovered(&training, &[&mask]);
     assert!(open.len() < training.len());
     for (all, left) in training.lights.iter().zip(&open.lights) {

@@ -42,7 +42,6 @@ pub fn fit_options(max_planes: usize, seed: u64) -> FitOptions {
             polished: 1,
             refine_steps: 6,
             replace_rounds: 1,
-            kicks: 0,
         },
         bake: BakeOptions { texture_size: 128, rounds: 3, smoothing: 1, turn: Turn::Free },
     }
