@@ -1,10 +1,12 @@
 //! Measures the program on its own models and on a folder of further ones, and writes the tracked tables.
 //!
 //!     cargo build --release --features flip
-//!     cargo run --release --features flip --example baseline -- [--validate short|full] [CORPUS_DIR]
+//!     cargo run --release --features flip --example baseline
+//!     cargo run --release --features flip --example baseline -- CORPUS_DIR
 //!
-//! Each case is one run of the release binary beside this example, so that time and memory are its own. Writes
-//! `reports/baseline/models.{csv,md}`, and with a folder `reports/baseline/corpus.{csv,md}`.
+//! Each case is one run of the release binary beside this example, so that time and memory are its own. The first
+//! writes `reports/baseline/models.{csv,md}`, with full validation; the second `reports/baseline/corpus.{csv,md}`, with
+//! the short one (full takes about two minutes a model without a GPU).
 
 use serde_json::Value;
 use std::{
@@ -41,20 +43,14 @@ const COLUMNS: [(&str, &str); 14] = [
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments: Vec<String> = std::env::args().skip(1).collect();
-    let mut validate = "full".to_string();
-    if arguments.first().is_some_and(|a| a == "--validate") {
-        validate = arguments.drain(..2.min(arguments.len())).next_back().unwrap_or(validate);
-    }
     let binary = std::env::current_exe()?.ancestors().nth(2).map(|dir| dir.join("shadowfit")).ok_or("no binary")?;
     if !binary.exists() {
         return Err(format!("{} is missing: cargo build --release --features flip", binary.display()).into());
     }
-    run("models", &own_cases(), &binary, &validate)?;
-    if let Some(folder) = arguments.first() {
-        run("corpus", &corpus_cases(Path::new(folder))?, &binary, &validate)?;
+    match std::env::args().nth(1) {
+        None => run("models", &own_cases(), &binary, "full"),
+        Some(folder) => run("corpus", &corpus_cases(Path::new(&folder))?, &binary, "short"),
     }
-    Ok(())
 }
 
 /// The project's models: as they come, and where the published and hand-placed planes are to be compared.

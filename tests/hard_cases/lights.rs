@@ -97,9 +97,9 @@ fn a_ground_that_is_all_in_shadow_is_all_dark() {
     let lights = LightDomain::Cone { axis: Vec3::Y, half_angle_rad: 0.2 };
     let (report, set) = Case { lights, ..Case::new([square(1.0, 0.0), roof].concat()) }.fit();
     assert_eq!(set.planes.len(), 1, "{report}");
-    // All that the model shows is in shadow: light that comes through is the only error there can be, and one closed
-    // texture leaves none.
+    // All that the model shows is in shadow: light that comes through is the only error there can be. One closed
+    // texture lets in what its crop cuts off, 0.05 % of the votes at each of four sides.
     assert_eq!(report.held_out.false_, 0.0);
-    assert!(report.held_out.shadow_error < 1e-3, "{:?}", report.held_out);
+    assert!(report.held_out.shadow_error < 2e-3, "{:?}", report.held_out);
     assert!((report.held_out.light_error - report.held_out.shadow_error).abs() < 1e-12, "{:?}", report.held_out);
 }
