@@ -24,7 +24,6 @@ use crate::{
 };
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
-use std::borrow::Cow;
 
 /// How hard to search.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,14 +151,14 @@ impl Search<'_> {
 
     fn greedy(&self, judge: &mut dyn FnMut(&[Mask]) -> Verdict) -> (Vec<Mask>, Verdict) {
         let mut planes: Vec<Mask> = Vec::new();
-        let mut open = Cow::Borrowed(self.pairs);
+        let mut open = self.pairs.clone();
         let mut bounds = vec![f64::INFINITY; self.candidates.len()];
         while planes.len() < self.options.max_planes {
             let Some((gain, mask)) = self.best_plane(&open, &mut bounds, None) else { break };
             if !self.worth(gain) {
                 break;
             }
-            open = Cow::Owned(uncovered(&open, &[&mask]));
+            open = uncovered(&open, &[&mask]);
             planes.push(mask);
             if judge(&planes) == Verdict::Enough {
                 return (planes, Verdict::Enough);
