@@ -28,6 +28,7 @@ impl Effort {
             selection: SelectionOptions {
                 texels: 64,
                 scoring_pairs: [60_000, 120_000],
+                screening_pairs: 30_000,
                 finalists: 48,
                 refined: 3,
                 replace_rounds: 0,
@@ -47,10 +48,10 @@ impl Effort {
             candidates: CandidateOptions { directions: 150, offsets: 12, surface_points: 400, seed: 0 },
             selection: SelectionOptions {
                 max_planes: 12,
-                min_gain: 0.005,
+                min_gain: 0.002,
                 scoring_pairs: [150_000, 250_000],
                 texels: 96,
-                screening_pairs: 30_000,
+                screening_pairs: 50_000,
                 finalists: 96,
                 refined: 4,
                 polished: 2,
