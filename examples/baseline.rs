@@ -5,8 +5,8 @@
 //!     cargo run --release --features flip --example baseline -- CORPUS_DIR
 //!
 //! Each case is one run of the release binary beside this example, so that time and memory are its own. The first
-//! writes `reports/baseline/models.{csv,md}`, with full validation; the second `reports/baseline/corpus.{csv,md}`, with
-//! the short one (full takes about two minutes a model without a GPU).
+//! writes `reports/baseline/models.{csv,md}`: preset balanced; the second `reports/baseline/corpus.{csv,md}`: preset fast.
+//! Frames are those of the short validation: the full one takes a minute and more a case without a GPU.
 
 use serde_json::Value;
 use std::{
@@ -48,8 +48,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err(format!("{} is missing: cargo build --release --features flip", binary.display()).into());
     }
     match std::env::args().nth(1) {
-        None => run("models", &own_cases(), &binary, "full"),
-        Some(folder) => run("corpus", &corpus_cases(Path::new(&folder))?, &binary, "short"),
+        None => run("models", &own_cases(), &binary, "balanced"),
+        Some(folder) => run("corpus", &corpus_cases(Path::new(&folder))?, &binary, "fast"),
     }
 }
 
@@ -106,7 +106,7 @@ fn corpus_cases(folder: &Path) -> Result<Vec<Case>, Box<dyn Error>> {
 }
 
 /// Runs the cases and writes the tables after each, so that a run that is cut short leaves what it has.
-fn run(table: &str, cases: &[Case], binary: &Path, validate: &str) -> Result<(), Box<dyn Error>> {
+fn run(table: &str, cases: &[Case], binary: &Path, preset: &str) -> Result<(), Box<dyn Error>> {
     let titles: Vec<&str> = COLUMNS.iter().map(|(title, _)| *title).collect();
     let mut csv = format!("case,exit,{}\n", titles.join(","));
     let mut markdown = format!("| case | exit | {} |\n|---|{}\n", titles.join(" | "), "---|".repeat(titles.len() + 1));
@@ -114,7 +114,7 @@ fn run(table: &str, cases: &[Case], binary: &Path, validate: &str) -> Result<(),
     for case in cases {
         let out = tempfile::tempdir()?;
         let output = Command::new(binary)
-            .args(["fit", "--json", "--validate", validate, "-o"])
+            .args(["fit", "--json", "--preset", preset, "-o"])
             .arg(out.path())
             .arg(&case.model)
             .args(&case.arguments)
