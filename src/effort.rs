@@ -7,7 +7,7 @@ use shadowfit_solver::{candidates::CandidateOptions, selection::SelectionOptions
 pub struct Effort {
     /// Receivers that decide planes and textures.
     pub receivers: usize,
-    /// Light directions that decide planes and textures; memory is about 9 bytes x receivers x lights.
+    /// Light directions that decide planes and textures; memory is about 10 bytes x receivers x lights.
     pub lights: usize,
     /// Where the search starts.
     pub candidates: CandidateOptions,
