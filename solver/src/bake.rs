@@ -10,7 +10,7 @@
 //! where a texel is crossed by few pairs: give it enough (15 pairs a texel cost about a third more held-out error).
 
 use crate::{
-    plane::{BakedPlane, OccluderTexture, ShadowPlane},
+    plane::{BakedPlane, Encoding, OccluderTexture, ShadowPlane},
     rectangle::{Turn, tighten},
     visibility::{LightPairs, Pairs},
     votes::{Mask, fill_unvoted, smoothed, sum_votes},
@@ -111,8 +111,8 @@ fn rebake(pairs: &Pairs, covers: &mut Covers, mask: &mut Mask, smoothing: usize)
 
 fn baked(mask: &Mask) -> BakedPlane {
     let texels = mask.width * mask.height;
-    let coverage = mask.blocked[..texels].iter().map(|&b| b * u8::MAX).collect();
-    let texture = OccluderTexture { width: mask.width, height: mask.height, coverage };
+    let texels = mask.blocked[..texels].iter().map(|&b| b * u8::MAX).collect();
+    let texture = OccluderTexture { width: mask.width, height: mask.height, encoding: Encoding::Coverage, texels };
     BakedPlane { plane: mask.plane, texture, side: mask.side, bias: mask.bias }
 }
 

@@ -1,8 +1,8 @@
 //! How wrong baked planes are against the traced reference.
 
 use crate::{
-    plane::BakedPlane,
-    shade::{plane_rows, visibility},
+    plane::BakedSet,
+    shade::{set_rows, visibility},
     visibility::{LightPairs, Pairs},
 };
 use glam::Vec3;
@@ -47,15 +47,15 @@ struct LightError {
     false_: f64,
 }
 
-/// Measures `planes` with the shader's arithmetic, bilinear taps and all.
+/// Measures planes with the shader's arithmetic, bilinear taps and all. `section_of` has one entry a receiver.
 #[must_use]
-pub fn measure(planes: &[BakedPlane], pairs: &Pairs) -> Metrics {
+pub fn measure(set: &BakedSet, pairs: &Pairs, section_of: &[u32]) -> Metrics {
     let count = pairs.lights.len();
     let mut metrics = Metrics { receivers: pairs.receivers, lights: count, ..Metrics::default() };
     if pairs.shadow_weight <= 0.0 {
         return metrics;
     }
-    let errors: Vec<LightError> = pairs.lights.par_iter().map(|light| measure_light(planes, light)).collect();
+    let errors: Vec<LightError> = pairs.lights.par_iter().map(|light| measure_light(set, light, section_of)).collect();
     let sum = |part: fn(&LightError) -> f64| errors.iter().map(part).sum::<f64>();
     metrics.missed = sum(|e| e.missed) / pairs.shadow_weight;
     metrics.false_ = sum(|e| e.false_) / pairs.shadow_weight;
@@ -70,11 +70,12 @@ pub fn measure(planes: &[BakedPlane], pairs: &Pairs) -> Metrics {
     metrics
 }
 
-fn measure_light(planes: &[BakedPlane], light: &LightPairs) -> LightError {
-    let rows: Vec<_> = planes.iter().map(|b| plane_rows(&b.plane, b.side, light.light)).collect();
+fn measure_light(set: &BakedSet, light: &LightPairs, section_of: &[u32]) -> LightError {
+    let (rows, lists) = (set_rows(set, light.light), set.lists(light.light));
     let mut error = LightError::default();
     for i in 0..light.len() {
-        let predicted = f64::from(visibility(planes, &rows, light.point(i)));
+        let list = &lists[section_of[light.receiver[i] as usize] as usize];
+        let predicted = f64::from(visibility(&set.planes, &rows, list, light.point(i)));
         let vote = f64::from(light.vote[i]);
         if vote > 0.0 {
             error.missed += vote * predicted;

@@ -35,15 +35,44 @@ pub enum Side {
     Back,
 }
 
-/// Coverage on a rectangle: 0 = open, 255 = blocks. The outermost ring of texels is open.
+/// How a texel is to be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Encoding {
+    /// 0 is open, 255 blocks, bilinear in between.
+    #[default]
+    Coverage,
+    /// A distance field: blocks where the bilinear value is at least [`SDF_BORDER`], open elsewhere; no grey. A
+    /// border keeps its place between texels, so it is as crisp at a quarter of the texels (Green, "Improved
+    /// Alpha-Tested Magnification for Vector Textures and Special Effects", 2007).
+    Sdf,
+}
+
+/// The value 0..1 at which a distance field begins to block: a byte of 128 does, one of 127 does not.
+pub const SDF_BORDER: f32 = 0.5;
+
+/// What a rectangle blocks. The outermost ring of texels is open: 0 as coverage, below 128 in a distance field.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OccluderTexture {
     /// Texels along u, at least 3.
     pub width: usize,
     /// Texels along v, at least 3.
     pub height: usize,
+    /// What a texel means.
+    pub encoding: Encoding,
     /// `[row][column]`, row along v, column along u.
-    pub coverage: Vec<u8>,
+    pub texels: Vec<u8>,
+}
+
+impl OccluderTexture {
+    /// Does a texel of this value, alone, block nothing?
+    #[must_use]
+    pub fn is_open(&self, texel: u8) -> bool {
+        match self.encoding {
+            Encoding::Coverage => texel == 0,
+            Encoding::Sdf => f32::from(texel) < SDF_BORDER * 255.0,
+        }
+    }
 }
 
 /// One plane, ready to cast.
@@ -57,4 +86,51 @@ pub struct BakedPlane {
     pub side: Side,
     /// A receiver nearer than this along the ray is not shadowed, unit space.
     pub bias: f32,
+}
+
+/// Indices of planes, one list a section.
+pub type SectionLists = Vec<Vec<u32>>;
+
+/// Which planes each section reads, for directions that stand for the light's.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ActiveLists {
+    /// Unit vectors towards the light; the one with the largest dot product with the light picks the lists, of two
+    /// equal ones the first.
+    pub directions: Vec<Vec3>,
+    /// One entry a direction; each list is a part of its section's.
+    pub lists: Vec<SectionLists>,
+}
+
+/// Planes, and which of them each section reads.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BakedSet {
+    /// All planes.
+    pub planes: Vec<BakedPlane>,
+    /// The planes of each section; at least one section.
+    pub sections: SectionLists,
+    /// Shorter lists per light direction; without them a section reads all its planes.
+    pub active: Option<ActiveLists>,
+}
+
+impl BakedSet {
+    /// One section that reads all planes.
+    #[must_use]
+    pub fn one_section(planes: Vec<BakedPlane>) -> Self {
+        let all = (0..planes.len() as u32).collect();
+        Self { planes, sections: vec![all], active: None }
+    }
+
+    /// The planes that each section reads under a light in direction `l`.
+    #[must_use]
+    pub fn lists(&self, l: Vec3) -> &SectionLists {
+        let Some(active) = &self.active else { return &self.sections };
+        let (mut nearest, mut largest) = (0, f32::NEG_INFINITY);
+        for (i, direction) in active.directions.iter().enumerate() {
+            let dot = direction.dot(l);
+            if dot > largest {
+                (nearest, largest) = (i, dot);
+            }
+        }
+        active.lists.get(nearest).unwrap_or(&self.sections)
+    }
 }

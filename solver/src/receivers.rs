@@ -38,6 +38,8 @@ pub struct Receivers {
     pub normals: Vec<Vec3>,
     /// Area (unit space) x exposure.
     pub weights: Vec<f32>,
+    /// The mesh's triangle that each lies on.
+    pub triangles: Vec<u32>,
 }
 
 /// Samples the drawn surface of `mesh`.
@@ -80,7 +82,7 @@ impl Strata {
 fn draw(mesh: &Mesh, strata: &Strata, options: &ReceiverOptions, count: usize) -> Receivers {
     let total = strata.running_area.last().copied().unwrap_or(0.0);
     let area = (total / count as f64) as f32;
-    let one = |i: usize| -> Option<(Vec3, Vec3, Vec3, f32)> {
+    let one = |i: usize| -> Option<(Vec3, Vec3, Vec3, f32, u32)> {
         let at = (i as f64 + uniform(options.seed, i as u64)) / count as f64 * total;
         let side = strata.running_area.partition_point(|&a| a <= at).min(strata.sides.len() - 1);
         let (triangle, sign) = strata.sides[side];
@@ -91,15 +93,16 @@ fn draw(mesh: &Mesh, strata: &Strata, options: &ReceiverOptions, count: usize) -
         let (point, normal) = (mesh.point(triangle, weights), mesh.normals[triangle as usize] * sign);
         let origin = ray_origin(point, normal);
         let exposure = exposure(mesh, origin, normal, options, i as u64);
-        (exposure > 0.0).then_some((point, origin, normal, area * exposure))
+        (exposure > 0.0).then_some((point, origin, normal, area * exposure, triangle))
     };
     let drawn: Vec<_> = (0..count).into_par_iter().map(one).collect();
     let mut receivers = Receivers::default();
-    for (point, origin, normal, weight) in drawn.into_iter().flatten() {
+    for (point, origin, normal, weight, triangle) in drawn.into_iter().flatten() {
         receivers.points.push(point);
         receivers.origins.push(origin);
         receivers.normals.push(normal);
         receivers.weights.push(weight);
+        receivers.triangles.push(triangle);
     }
     receivers
 }

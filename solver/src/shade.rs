@@ -6,7 +6,7 @@
 //! For a receiver p, light direction l (unit, towards the light), plane (o, u, v), N = u x v, n = N/|N|:
 //! `s = n.(o-p) / n.l`, `q = p + s l`, `a = (q-o).(v x N)/|N|^2`, `b = (q-o).(N x u)/|N|^2`.
 
-use crate::plane::{BakedPlane, OccluderTexture, ShadowPlane, Side};
+use crate::plane::{BakedPlane, BakedSet, Encoding, OccluderTexture, SDF_BORDER, ShadowPlane, Side};
 use glam::{Vec3, Vec4};
 
 /// A plane whose `|n.l|` is below this casts nothing under that light. At 0.002 (0.11 degrees) a plane across
@@ -91,7 +91,8 @@ pub fn crossing_point_light(baked: &BakedPlane, c: Vec3, p: Vec3) -> Option<(f32
     inside.then_some((a, b))
 }
 
-/// Bilinear coverage 0..1 at `(a, b)` in 0..1, taps clamped to the texture.
+/// How much of the light is blocked, 0..1, at `(a, b)` in 0..1: the bilinear value, taps clamped to the texture; of a
+/// distance field, whether that reaches its border.
 #[must_use]
 pub fn sample(texture: &OccluderTexture, a: f32, b: f32) -> f32 {
     let (w, h) = (texture.width, texture.height);
@@ -100,17 +101,28 @@ pub fn sample(texture: &OccluderTexture, a: f32, b: f32) -> f32 {
     let (x0, y0) = (x as usize, y as usize);
     let (x1, y1) = ((x0 + 1).min(w - 1), (y0 + 1).min(h - 1));
     let (fx, fy) = (x - x0 as f32, y - y0 as f32);
-    let tap = |x: usize, y: usize| f32::from(texture.coverage[y * w + x]);
+    let tap = |x: usize, y: usize| f32::from(texture.texels[y * w + x]);
     let row = |y: usize| tap(x0, y) + fx * (tap(x1, y) - tap(x0, y));
-    (row(y0) + fy * (row(y1) - row(y0))) / 255.0
+    let value = (row(y0) + fy * (row(y1) - row(y0))) / 255.0;
+    match texture.encoding {
+        Encoding::Coverage => value,
+        Encoding::Sdf => f32::from(u8::from(value >= SDF_BORDER)),
+    }
 }
 
-/// Predicted visibility V~ in 0..1 of a receiver at `p` under a directional light: the product over planes of
-/// `1 - T(a, b)`, left as soon as one plane blocks. `rows` is aligned with `planes`.
+/// The rows of all planes of a set under one directional light.
 #[must_use]
-pub fn visibility(planes: &[BakedPlane], rows: &[Option<PlaneRows>], p: Vec3) -> f32 {
+pub fn set_rows(set: &BakedSet, l: Vec3) -> Vec<Option<PlaneRows>> {
+    set.planes.iter().map(|baked| plane_rows(&baked.plane, baked.side, l)).collect()
+}
+
+/// Predicted visibility V~ in 0..1 of a receiver at `p` under a directional light: the product over the planes of
+/// its section's `list` of `1 - T(a, b)`, left as soon as one plane blocks. `rows` is aligned with `planes`.
+#[must_use]
+pub fn visibility(planes: &[BakedPlane], rows: &[Option<PlaneRows>], list: &[u32], p: Vec3) -> f32 {
     let mut v = 1.0;
-    for (baked, rows) in planes.iter().zip(rows) {
+    for &index in list {
+        let (baked, rows) = (&planes[index as usize], &rows[index as usize]);
         let Some(rows) = rows else { continue };
         if let Some((a, b)) = crossing(rows, baked.bias, p) {
             v *= 1.0 - sample(&baked.texture, a, b);
@@ -122,10 +134,11 @@ pub fn visibility(planes: &[BakedPlane], rows: &[Option<PlaneRows>], p: Vec3) ->
     v
 }
 
-/// Predicted visibility of a receiver at `p` under a point light at `c`.
+/// Predicted visibility of a receiver at `p` under a point light at `c`; the list is that of the direction from the
+/// model's middle to the light.
 #[must_use]
-pub fn visibility_point_light(planes: &[BakedPlane], c: Vec3, p: Vec3) -> f32 {
-    planes.iter().fold(1.0, |v, baked| match crossing_point_light(baked, c, p) {
+pub fn visibility_point_light(planes: &[BakedPlane], list: &[u32], c: Vec3, p: Vec3) -> f32 {
+    list.iter().map(|&index| &planes[index as usize]).fold(1.0, |v, baked| match crossing_point_light(baked, c, p) {
         Some((a, b)) if v > 0.0 => v * (1.0 - sample(&baked.texture, a, b)),
         _ => v,
     })
