@@ -4,14 +4,21 @@
 //! no environment, no printing.
 
 pub mod bake;
+pub mod budget;
 pub mod candidates;
+pub mod field;
+pub mod fit;
 pub mod lights;
 pub mod mesh;
 pub mod metrics;
 pub mod plane;
 pub mod receivers;
+pub mod pair_table;
 pub mod rectangle;
 pub mod sampling;
+pub mod search;
+pub mod lists;
+pub mod sections;
 pub mod selection;
 pub mod shade;
 pub mod visibility;

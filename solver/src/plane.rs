@@ -1,5 +1,6 @@
 //! Shadow planes and their occluder textures: the things that the search finds and the asset carries.
 
+use crate::pair_table::nearest;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -124,13 +125,6 @@ impl BakedSet {
     #[must_use]
     pub fn lists(&self, l: Vec3) -> &SectionLists {
         let Some(active) = &self.active else { return &self.sections };
-        let (mut nearest, mut largest) = (0, f32::NEG_INFINITY);
-        for (i, direction) in active.directions.iter().enumerate() {
-            let dot = direction.dot(l);
-            if dot > largest {
-                (nearest, largest) = (i, dot);
-            }
-        }
-        active.lists.get(nearest).unwrap_or(&self.sections)
+        active.lists.get(nearest(&active.directions, l)).unwrap_or(&self.sections)
     }
 }

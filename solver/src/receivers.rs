@@ -45,7 +45,14 @@ pub struct Receivers {
 /// Samples the drawn surface of `mesh`.
 #[must_use]
 pub fn sample(mesh: &Mesh, options: &ReceiverOptions) -> Receivers {
-    let strata = Strata::new(mesh);
+    let all: Vec<u32> = (0..mesh.triangle_count() as u32).collect();
+    sample_triangles(mesh, &all, options)
+}
+
+/// Samples the drawn surface of some triangles, given in rising order.
+#[must_use]
+pub fn sample_triangles(mesh: &Mesh, triangles: &[u32], options: &ReceiverOptions) -> Receivers {
+    let strata = Strata::new(mesh, triangles);
     let first = draw(mesh, &strata, options, options.count);
     let kept = first.points.len();
     // Hidden surface was drawn in vain: draw again so that about `count` are left.
@@ -65,9 +72,10 @@ struct Strata {
 }
 
 impl Strata {
-    fn new(mesh: &Mesh) -> Self {
+    fn new(mesh: &Mesh, triangles: &[u32]) -> Self {
         let (mut sides, mut running_area, mut total) = (Vec::new(), Vec::new(), 0.0);
-        for triangle in 0..mesh.triangle_count() {
+        for &triangle in triangles {
+            let triangle = triangle as usize;
             let signs: &[f32] = if mesh.sides[triangle] == Sides::Both { &[1.0, -1.0] } else { &[1.0] };
             for &sign in signs {
                 total += f64::from(mesh.areas[triangle]);

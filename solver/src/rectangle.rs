@@ -5,7 +5,7 @@ use crate::{
     visibility::Pairs,
     votes::{Mask, sum_votes},
 };
-use glam::{Vec2, Vec3};
+use glam::{Quat, Vec2, Vec3};
 
 /// Rotations tried between 0 and 90 degrees when a rectangle is fitted: 2.5 degrees apart, where the area of a
 /// long thin shape is within 5 % of the best.
@@ -14,6 +14,9 @@ const ROTATIONS: usize = 36;
 /// Each side of a rectangle may cut off this share of the votes for blocking: a few stray texels far out would
 /// otherwise halve the resolution of all the others.
 const TRIM: f64 = 5e-4;
+
+/// Shift in unit space that goes with a tilt of one radian: moves the rim of a plane about as far as the tilt does.
+const SHIFT_PER_TILT: f32 = 0.5;
 
 /// Bins of the histograms that decide where to cut; the cut is exact to 1/1024 of the untrimmed rectangle.
 const BINS: usize = 1024;
@@ -64,24 +67,41 @@ pub enum Turn {
 /// never larger than the mask's own. `None` where nothing blocks.
 #[must_use]
 pub fn tighten(pairs: &Pairs, mask: &Mask, turn: Turn) -> Option<ShadowPlane> {
-    let plane = &mask.plane;
+    let mut votes = sum_votes(pairs, mask, |_, _, texel| mask.blocked[texel] != 0);
+    votes.truncate(mask.width * mask.height);
+    let blocks = |i: usize| (mask.blocked[i] != 0).then(|| f64::from(votes[i].max(0.0)));
+    around_texels(&mask.plane, (mask.width, mask.height), turn, &blocks)
+}
+
+/// The rectangle in the plane of `plane`, turned for the least area, tight around the texels (`width` a row) with
+/// positive votes. `None` where there is none.
+#[must_use]
+pub fn tight_around(plane: &ShadowPlane, votes: &[f32], width: usize) -> Option<ShadowPlane> {
+    let blocks = |i: usize| (votes[i] > 0.0).then(|| f64::from(votes[i]));
+    around_texels(plane, (width, votes.len() / width), Turn::Free, &blocks)
+}
+
+/// See [`tighten`]; `blocks` gives the votes of a texel that blocks.
+fn around_texels(
+    plane: &ShadowPlane,
+    (width, height): (usize, usize),
+    turn: Turn,
+    blocks: &dyn Fn(usize) -> Option<f64>,
+) -> Option<ShadowPlane> {
     let (lu, lv) = (plane.u.length(), plane.v.length());
     let (eu, ev) = (plane.u / lu, plane.v / lv);
-    let votes = sum_votes(pairs, mask, |_, _, texel| mask.blocked[texel] != 0);
     // Texel centres with what they are worth, in the rectangle's own metric.
-    let texels: Vec<(Vec2, f64)> = (0..mask.width * mask.height)
-        .filter(|&i| mask.blocked[i] != 0)
-        .map(|i| {
-            let (x, y) = ((i % mask.width) as f32 + 0.5, (i / mask.width) as f32 + 0.5);
-            let centre = Vec2::new(x / mask.width as f32 * lu, y / mask.height as f32 * lv);
-            (centre, f64::from(votes[i].max(0.0)))
-        })
-        .collect();
+    let centre = |i: usize| {
+        let (x, y) = ((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
+        Vec2::new(x / width as f32 * lu, y / height as f32 * lv)
+    };
+    let texels: Vec<(Vec2, f64)> =
+        (0..width * height).filter_map(|i| blocks(i).map(|votes| (centre(i), votes))).collect();
     if texels.is_empty() {
         return None;
     }
     let rotations = if turn == Turn::Free { ROTATIONS } else { 1 };
-    let texel = Vec2::new(lu / mask.width as f32, lv / mask.height as f32);
+    let texel = Vec2::new(lu / width as f32, lv / height as f32);
     let (axis, least, most) = (0..rotations)
         .map(|k| {
             let axis = Vec2::from_angle(k as f32 / ROTATIONS as f32 * std::f32::consts::FRAC_PI_2);
@@ -94,6 +114,27 @@ pub fn tighten(pairs: &Pairs, mask: &Mask, turn: Turn) -> Option<ShadowPlane> {
     let (du, dv) = (eu * axis.x + ev * axis.y, ev * axis.x - eu * axis.y);
     let size = most - least;
     Some(ShadowPlane { origin: plane.origin + du * least.x + dv * least.y, u: du * size.x, v: dv * size.y })
+}
+
+/// The rectangle turned about its middle, around its v or u edge, or moved along its normal.
+#[must_use]
+pub fn shifted(plane: &ShadowPlane, direction: usize, tilt: f32) -> ShadowPlane {
+    let middle = plane.origin + 0.5 * (plane.u + plane.v);
+    let (axis, shift) = match direction {
+        0 => (plane.u, Vec3::ZERO),
+        1 => (plane.v, Vec3::ZERO),
+        _ => (Vec3::ZERO, plane.normal() * (tilt * SHIFT_PER_TILT)),
+    };
+    let turn = Quat::from_scaled_axis(axis.normalize_or_zero() * tilt);
+    let (u, v) = (turn * plane.u, turn * plane.v);
+    ShadowPlane { origin: middle + shift - 0.5 * (u + v), u, v }
+}
+
+/// The rectangle with `room` (a share of its size) added at each side.
+#[must_use]
+pub fn enlarged(plane: &ShadowPlane, room: f32) -> ShadowPlane {
+    let (u, v) = (plane.u * (1.0 + 2.0 * room), plane.v * (1.0 + 2.0 * room));
+    ShadowPlane { origin: plane.origin - room * (plane.u + plane.v), u, v }
 }
 
 /// Least and largest coordinate along `axis` of the texels, with [`TRIM`] of their votes cut off at either end.

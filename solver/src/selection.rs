@@ -18,11 +18,11 @@ use crate::{
     candidates::Candidate,
     mesh::Mesh,
     plane::ShadowPlane,
-    rectangle::{Turn, around_section, tighten},
+    rectangle::{Turn, around_section, enlarged, shifted, tighten},
     visibility::Pairs,
     votes::{BIAS, Mask, best_bias, best_mask, score, thinned, uncovered},
 };
-use glam::{Quat, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// How hard to search.
@@ -86,9 +86,6 @@ const SCREENING_TEXELS: usize = 32;
 
 /// First tilt of the refinement, radians: about the spacing of the candidates.
 const FIRST_TILT: f32 = 0.12;
-
-/// Shift in unit space that goes with a tilt of one radian: moves the rim of a plane about as far as the tilt does.
-const SHIFT_PER_TILT: f32 = 0.5;
 
 /// Planes within this cosine (8 degrees) and distance are one: refining both would end in the same place.
 const SAME_COSINE: f32 = 0.99;
@@ -347,25 +344,6 @@ fn distinct(mut scored: Vec<(f64, ShadowPlane)>, count: usize) -> Vec<(f64, Shad
         }
     }
     kept
-}
-
-/// The rectangle turned about its middle, around its v or u edge, or moved along its normal.
-fn shifted(plane: &ShadowPlane, direction: usize, tilt: f32) -> ShadowPlane {
-    let middle = plane.origin + 0.5 * (plane.u + plane.v);
-    let (axis, shift) = match direction {
-        0 => (plane.u, Vec3::ZERO),
-        1 => (plane.v, Vec3::ZERO),
-        _ => (Vec3::ZERO, plane.normal() * (tilt * SHIFT_PER_TILT)),
-    };
-    let turn = Quat::from_scaled_axis(axis.normalize_or_zero() * tilt);
-    let (u, v) = (turn * plane.u, turn * plane.v);
-    ShadowPlane { origin: middle + shift - 0.5 * (u + v), u, v }
-}
-
-/// The rectangle with `room` (a share of its size) added at each side.
-fn enlarged(plane: &ShadowPlane, room: f32) -> ShadowPlane {
-    let (u, v) = (plane.u * (1.0 + 2.0 * room), plane.v * (1.0 + 2.0 * room));
-    ShadowPlane { origin: plane.origin - room * (plane.u + plane.v), u, v }
 }
 
 /// Index of the smallest number.

@@ -4,7 +4,7 @@
 //! where the light is blocked, negative where it is not. A texel of an occluder texture should block exactly where
 //! the votes of the pairs whose rays cross it sum to more than zero; everything later works on these four columns.
 
-use crate::{mesh::Mesh, receivers::Receivers};
+use crate::{mesh::Mesh, receivers::Receivers, sampling::hash};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -109,8 +109,15 @@ impl Pairs {
 /// Traces one shadow ray for every receiver that faces a light; `solid_angle` is that of all lights together.
 #[must_use]
 pub fn trace(mesh: &Mesh, receivers: &Receivers, lights: &[Vec3], solid_angle: f64) -> Pairs {
-    let share = (solid_angle / lights.len().max(1) as f64) as f32;
-    let lights: Vec<LightPairs> = lights.par_iter().map(|&l| trace_light(mesh, receivers, l, share)).collect();
+    trace_sparse(mesh, receivers, lights, solid_angle, 1)
+}
+
+/// The same with one in `stride` receivers for each light, drawn anew for each. Drawn, not counted off: a lattice of
+/// receivers under a lattice of lights left some directions with the same corner of every triangle.
+#[must_use]
+pub fn trace_sparse(mesh: &Mesh, receivers: &Receivers, lights: &[Vec3], solid_angle: f64, stride: usize) -> Pairs {
+    let share = (solid_angle / lights.len().max(1) as f64) as f32 * stride as f32;
+    let lights: Vec<LightPairs> = lights.par_iter().enumerate().map(|(k, &l)| trace_light(mesh, receivers, l, share, (stride, k))).collect();
     let (mut shadow_weight, mut total_weight) = (0.0, 0.0);
     for vote in lights.iter().flat_map(|l| &l.vote) {
         shadow_weight += f64::from(vote.max(0.0));
@@ -119,11 +126,14 @@ pub fn trace(mesh: &Mesh, receivers: &Receivers, lights: &[Vec3], solid_angle: f
     Pairs { lights, shadow_weight, total_weight, receivers: receivers.points.len() }
 }
 
-fn trace_light(mesh: &Mesh, receivers: &Receivers, light: Vec3, solid_angle: f32) -> LightPairs {
-    let mut pairs = LightPairs::with_capacity(light, receivers.points.len() / 2);
+fn trace_light(mesh: &Mesh, receivers: &Receivers, light: Vec3, solid_angle: f32, (stride, index): (usize, usize)) -> LightPairs {
+    let mut pairs = LightPairs::with_capacity(light, receivers.points.len() / 2 / stride);
     for fold in 0..2 {
         pairs.split = if fold == 1 { pairs.len() } else { 0 };
         for i in (fold..receivers.points.len()).step_by(2) {
+            if stride > 1 && hash(index as u64, i as u64) % stride as u64 != 0 {
+                continue;
+            }
             let cosine = receivers.normals[i].dot(light);
             if cosine <= 0.0 {
                 continue;

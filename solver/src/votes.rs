@@ -164,7 +164,7 @@ fn cross_validated(votes0: &[f32], votes1: &[f32], width: usize) -> f64 {
 }
 
 /// Votes under a 3 x 3 binomial kernel; beyond the border there are none.
-pub(crate) fn smoothed(votes: &[f32], width: usize) -> Vec<f32> {
+pub fn smoothed(votes: &[f32], width: usize) -> Vec<f32> {
     let height = votes.len() / width;
     let mut rows = vec![0.0; votes.len()];
     for (row, votes) in rows.chunks_exact_mut(width).zip(votes.chunks_exact(width)) {
@@ -189,7 +189,7 @@ pub(crate) fn smoothed(votes: &[f32], width: usize) -> Vec<f32> {
 /// Gives texels without a vote the votes of their surroundings: where few receivers or nearly one light leave most
 /// texels uncrossed, the texture would be full of holes. Votes are summed 2 x 2 until every texel has one, and
 /// interpolated back (the pull-push of Gortler et al., "The Lumigraph", 1996). Other texels stay as they are.
-pub(crate) fn fill_unvoted(votes: &mut [f32], width: usize) {
+pub fn fill_unvoted(votes: &mut [f32], width: usize) {
     let height = votes.len() / width;
     if width.max(height) == 1 || votes.iter().all(|v| *v != 0.0) || votes.iter().all(|v| *v == 0.0) {
         return;

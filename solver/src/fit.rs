@@ -1,0 +1,56 @@
+//! The fit: from traced pairs to planes in sections, with textures and active lists.
+
+use crate::{
+    budget::{self, BudgetOptions},
+    field::{VoteGrid, VotedShape},
+    lists::{SectionFit, VotedPlane},
+    plane::{ActiveLists, BakedPlane, BakedSet, ShadowPlane, Side},
+};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Bakes the planes of all sections to textures of the sizes that the budget gives them. `directions` are those of the
+/// lists.
+#[must_use]
+pub fn bake(fits: &[SectionFit], directions: &[Vec3], shadow_weight: f64, options: &BudgetOptions) -> BakedSet {
+    let planes: Vec<&VotedPlane> = fits.iter().flat_map(|fit| &fit.planes).collect();
+    let sizes = budget::sizes(&planes, shadow_weight, options);
+    let bake_one = |(plane, size): (&&VotedPlane, &Option<(usize, usize)>)| {
+        size.and_then(|size| baked(plane, size, options.smoothing))
+    };
+    let baked: Vec<Option<BakedPlane>> = planes.par_iter().zip(&sizes).map(bake_one).collect();
+    let mut set = BakedSet::default();
+    let mut index: Vec<Option<u32>> = Vec::with_capacity(baked.len());
+    for plane in baked {
+        index.push(plane.is_some().then_some(set.planes.len() as u32));
+        set.planes.extend(plane);
+    }
+    let mut first = 0;
+    let mut lists = vec![Vec::with_capacity(fits.len()); directions.len()];
+    for fit in fits {
+        let index = &index[first..first + fit.planes.len()];
+        first += fit.planes.len();
+        set.sections.push(index.iter().flatten().copied().collect());
+        for (lists, list) in lists.iter_mut().zip(&fit.lists) {
+            lists.push(list.iter().filter_map(|&k| index[k as usize]).collect::<Vec<u32>>());
+        }
+    }
+    set.active = Some(ActiveLists { directions: directions.to_vec(), lists });
+    set
+}
+
+/// The plane with a field of the given size; `None` where it would block nothing.
+fn baked(plane: &VotedPlane, size: (usize, usize), smoothing: usize) -> Option<BakedPlane> {
+    let votes: Vec<f32> = plane.votes[0].iter().zip(&plane.votes[1]).map(|(a, b)| a + b).collect();
+    let grid = VoteGrid { votes: &votes, width: plane.width, height: plane.height };
+    let texture = VotedShape::new(grid, smoothing).field(size);
+    let blocks = texture.texels.iter().any(|&texel| !texture.is_open(texel));
+    let plane = BakedPlane { plane: plane.plane, texture, side: Side::Both, bias: plane.bias };
+    blocks.then_some(plane)
+}
+
+/// The rectangle enlarged by the texture's outermost ring.
+fn with_ring(plane: &ShadowPlane, (width, height): (usize, usize)) -> ShadowPlane {
+    let (su, sv) = (plane.u / (width - 2) as f32, plane.v / (height - 2) as f32);
+    ShadowPlane { origin: plane.origin - su - sv, u: su * width as f32, v: sv * height as f32 }
+}

@@ -1,0 +1,453 @@
+//! Search: the planes of one section.
+//!
+//! In: the section's pairs. Out: planes in the order of their worth. Method: greedy, always the plane that lowers the
+//! error most on what the ones before leave open. Planes are proposed where the error is: through the middle of what
+//! blocks pairs that are still uncovered, along the blocker's surface, across it, square to the light, square to an
+//! axis, and anyhow. Proposals are screened on a small sample, the best get a rectangle tight around what they block
+//! and are refined on a larger one (compass search over two tilts and the offset, then the bias). *Replace* rounds
+//! take each plane out and search again.
+//!
+//! What a plane brings is measured as an asset would use it: it is read only under light directions where it gains
+//! (its window), its texture is decided by the pairs of its window, and gains are counted under lights that did not
+//! decide the texture.
+//!
+//! Guaranteed: the result depends on the input alone, not on threads. Not guaranteed: optimality.
+
+use crate::{
+    mesh::{Mesh, ray_origin},
+    pair_table::{PairTable, SPARE, SampleSize},
+    plane::ShadowPlane,
+    rectangle::{around_section, enlarged, shifted, tight_around},
+    sampling::{hash, uniform},
+    votes::smoothed,
+};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// How hard to search.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SearchOptions {
+    /// At most this many planes.
+    pub max_planes: usize,
+    /// Planes that are screened for each pick.
+    pub proposals: usize,
+    /// What they are screened on.
+    pub screening: SampleSize,
+    /// Texels a side of the screening textures, 16 to 64.
+    pub screening_texels: usize,
+    /// Screened planes that get a tight rectangle.
+    pub finalists: usize,
+    /// Finalists that are refined.
+    pub refined: usize,
+    /// What finalists are measured on.
+    pub scoring: SampleSize,
+    /// Texels a side of their textures, 32 to 128.
+    pub texels: usize,
+    /// Halvings of the refinement's step.
+    pub refine_steps: usize,
+    /// Rounds in which each plane is taken out and searched anew; each costs as much as the greedy search.
+    pub replace_rounds: usize,
+    /// Another seed draws other samples and proposals.
+    pub seed: u64,
+}
+
+/// A plane that the search found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// Where it lies.
+    pub plane: ShadowPlane,
+    /// A receiver nearer than this along the ray is not shadowed, unit space.
+    pub bias: f32,
+    /// Drop of the weighted error when it was found.
+    pub gain: f64,
+}
+
+/// What the caller says to a set of planes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Look for more.
+    Continue,
+    /// Good enough: stop, and see whether fewer do.
+    Enough,
+}
+
+/// The planes found.
+#[derive(Clone, Debug, Default)]
+pub struct Selection {
+    /// The final planes.
+    pub planes: Vec<Found>,
+    /// Those of the greedy phase in the order they were picked: the first k are its answer for k planes.
+    pub greedy: Vec<Found>,
+    /// Exchanges made by the replace rounds.
+    pub replaced: usize,
+}
+
+/// The bias that a search starts with; see [`BIASES`].
+pub const BIAS: f32 = 0.01;
+
+/// What a plane's bias is chosen from: small ones for plates that touch what they shadow, large ones for cuts through
+/// round bodies, where the rays of receivers beside the cut cross the plane at the border of the texture. The smallest
+/// still clears receivers that lie *on* the plane (computed up to 5e-5 beside it).
+pub const BIASES: [f32; 6] = [5e-4, 2e-3, 5e-3, BIAS, 0.02, 0.04];
+
+/// Rounds of deciding the texture and the window in turn.
+const WINDOW_ROUNDS: usize = 2;
+
+/// First tilt of the refinement, radians: planes through the middle of a blocker are off by about this.
+const FIRST_TILT: f32 = 0.12;
+
+/// Room at each side of a finalist's rectangle, as a share of it, so that moving it can uncover more; and of the final
+/// one.
+const ROOM: [f32; 2] = [0.1, 0.08];
+
+/// A rectangle tighter than the refined one is taken even if it gains this much less: its texels are smaller.
+const TIGHTER_IS_WORTH: f64 = 0.98;
+
+/// A replacement must gain this much more (relative): less is noise and would never settle.
+const REPLACE_MARGIN: f64 = 2e-3;
+
+/// Blockers thicker than this are cut here, unit space: the middle of a large body is far from what casts.
+const MAX_THICKNESS: f32 = 0.4;
+
+/// A flat model has a box without thickness: sections of it get some.
+const PAD: f32 = 1e-3;
+
+/// Rays start this far from the receiver when its blocker is looked up, unit space.
+const LOOKUP_OFFSET: f32 = 1e-4;
+
+/// Everything a search needs, borrowed.
+struct Search<'a> {
+    mesh: &'a Mesh,
+    table: &'a PairTable,
+    options: &'a SearchOptions,
+    low: Vec3,
+    high: Vec3,
+}
+
+/// Memory for one measurement, kept from one to the next.
+#[derive(Default)]
+struct Scratch {
+    /// Texel of each pair.
+    texels: Vec<u16>,
+    /// Votes per texel, the folds one after the other.
+    votes: Vec<f32>,
+    /// 1 where a texture decided by a fold blocks.
+    blocked: Vec<f32>,
+    /// Gain per direction; the window is where it is positive.
+    gains: Vec<f32>,
+}
+
+/// A texture with its window.
+struct Cast {
+    blocked: Vec<u8>,
+    window: Vec<bool>,
+}
+
+/// Searches planes for the pairs of `table`. A plane must lower the weighted error by `min_gain`. `judge` sees the
+/// planes after each pick; once it says [`Verdict::Enough`] the search turns to fewer planes and keeps the smallest
+/// set that `judge` accepts.
+pub fn search(
+    mesh: &Mesh,
+    table: &PairTable,
+    options: &SearchOptions,
+    min_gain: f64,
+    judge: &mut dyn FnMut(&[Found]) -> Verdict,
+) -> Selection {
+    let corners = || mesh.corners.iter().flatten();
+    let low = corners().fold(Vec3::INFINITY, |a, p| a.min(*p)) - PAD;
+    let high = corners().fold(Vec3::NEG_INFINITY, |a, p| a.max(*p)) + PAD;
+    let search = Search { mesh, table, options, low, high };
+    let (greedy, verdict) = search.greedy(min_gain, judge);
+    let mut planes = greedy.clone();
+    let mut replaced = 0;
+    for round in 0..options.replace_rounds {
+        let exchanges = search.replace_round(&mut planes, round);
+        replaced += exchanges;
+        if exchanges == 0 {
+            break;
+        }
+    }
+    if verdict == Verdict::Enough {
+        search.shrink(&mut planes, judge);
+    }
+    Selection { planes, greedy, replaced }
+}
+
+impl Search<'_> {
+    fn greedy(&self, min_gain: f64, judge: &mut dyn FnMut(&[Found]) -> Verdict) -> (Vec<Found>, Verdict) {
+        let mut planes = Vec::new();
+        let mut covered = vec![false; self.table.len()];
+        while planes.len() < self.options.max_planes {
+            let open = self.table.filtered(|i| !covered[i]);
+            let seed = hash(self.options.seed, planes.len() as u64);
+            let Some((found, cast)) = self.best_plane(&open, seed, None) else { break };
+            if found.gain < min_gain {
+                break;
+            }
+            covered.iter_mut().zip(self.covered_by(&found, &cast)).for_each(|(a, b)| *a |= b);
+            planes.push(found);
+            if judge(&planes) == Verdict::Enough {
+                return (planes, Verdict::Enough);
+            }
+        }
+        (planes, Verdict::Continue)
+    }
+
+    /// Takes each plane out and puts the best one found back; returns the number of exchanges.
+    fn replace_round(&self, planes: &mut [Found], round: usize) -> usize {
+        let mut scratch = Scratch::default();
+        let mut exchanges = 0;
+        let mut covers = self.covers(planes);
+        for k in 0..planes.len() {
+            let open = self.table.filtered(|i| !covers.iter().enumerate().any(|(j, cover)| j != k && cover[i]));
+            let seed = hash(self.options.seed ^ 0x5EED, (round * planes.len() + k) as u64);
+            let scoring = open.sample(self.options.scoring, seed);
+            let kept = Found { gain: self.gain(&scoring, &planes[k], &mut scratch), ..planes[k] };
+            let found = self.best_plane(&open, seed, Some(&planes[k]));
+            if let Some((found, cast)) = found.filter(|(found, _)| found.gain > kept.gain * (1.0 + REPLACE_MARGIN)) {
+                exchanges += 1;
+                covers[k] = self.covered_by(&found, &cast);
+                planes[k] = found;
+            } else {
+                planes[k] = kept;
+            }
+        }
+        exchanges
+    }
+
+    /// Takes the least useful plane out and lets the others move, as long as `judge` finds the rest good enough.
+    fn shrink(&self, planes: &mut Vec<Found>, judge: &mut dyn FnMut(&[Found]) -> Verdict) {
+        while planes.len() > 1 {
+            let mut fewer = planes.clone();
+            let gains = self.gains(&fewer);
+            let Some(least) = (0..gains.len()).min_by(|&a, &b| gains[a].total_cmp(&gains[b])) else { break };
+            fewer.remove(least);
+            self.replace_round(&mut fewer, planes.len());
+            if judge(&fewer) == Verdict::Continue {
+                break;
+            }
+            *planes = fewer;
+        }
+    }
+
+    /// What each plane gains given the others.
+    fn gains(&self, planes: &[Found]) -> Vec<f64> {
+        let covers = self.covers(planes);
+        let gain = |k: usize| {
+            let open = self.table.filtered(|i| !covers.iter().enumerate().any(|(j, cover)| j != k && cover[i]));
+            self.gain(&open.sample(self.options.scoring, self.options.seed), &planes[k], &mut Scratch::default())
+        };
+        (0..planes.len()).map(gain).collect()
+    }
+
+    /// Which pairs each plane covers, in the order of the planes: each decided by what those before leave open.
+    fn covers(&self, planes: &[Found]) -> Vec<Vec<bool>> {
+        let mut scratch = Scratch::default();
+        let mut any = vec![false; self.table.len()];
+        let cover = |found: &Found| {
+            let open = self.table.filtered(|i| !any[i]).sample(self.options.scoring, self.options.seed);
+            let cover = self.covered_by(found, &self.cast(&open, found, &mut scratch));
+            any.iter_mut().zip(&cover).for_each(|(a, b)| *a |= b);
+            cover
+        };
+        planes.iter().map(cover).collect()
+    }
+
+    /// The best plane for pairs that nothing covers; `start` is one more to improve.
+    fn best_plane(&self, open: &PairTable, seed: u64, start: Option<&Found>) -> Option<(Found, Cast)> {
+        let o = self.options;
+        let scoring = &open.sample(o.scoring, seed);
+        let screening = &scoring.sample(o.screening, hash(seed, 1));
+        let wide: Vec<ShadowPlane> = self.proposals(scoring, seed);
+        let screened = measured(wide, |plane, scratch| {
+            Some((windowed(screening, plane, BIAS, o.screening_texels, scratch), *plane))
+        });
+        let finalists: Vec<ShadowPlane> = screened.into_iter().take(o.finalists).map(|(_, plane)| plane).collect();
+        let mut tight = measured(finalists, |plane, scratch| {
+            let plane = self.tight(scoring, &Found { plane: *plane, bias: BIAS, gain: 0.0 }, ROOM[0], scratch)?;
+            Some((windowed(scoring, &plane, BIAS, o.texels, scratch), plane))
+        });
+        tight.truncate(o.refined);
+        let starts: Vec<Found> = tight.iter().map(|(gain, plane)| Found { plane: *plane, bias: BIAS, gain: *gain }).collect();
+        let starts: Vec<Found> = starts.into_iter().chain(start.copied()).collect();
+        let refined: Vec<Found> =
+            starts.par_iter().map_init(Scratch::default, |scratch, found| self.refine(scoring, *found, scratch)).collect();
+        let best = refined.into_iter().reduce(|a, b| if b.gain > a.gain { b } else { a })?;
+        let cast = self.cast(scoring, &best, &mut Scratch::default());
+        Some((best, cast))
+    }
+
+    fn gain(&self, pairs: &PairTable, found: &Found, scratch: &mut Scratch) -> f64 {
+        windowed(pairs, &found.plane, found.bias, self.options.texels, scratch)
+    }
+
+    /// Compass search (a step each way in both tilts and the offset; what gains is kept, else the step is halved), then
+    /// a tight rectangle, then the bias.
+    fn refine(&self, pairs: &PairTable, start: Found, scratch: &mut Scratch) -> Found {
+        let mut at = Found { gain: self.gain(pairs, &start, scratch), ..start };
+        let mut tilt = FIRST_TILT;
+        for _ in 0..self.options.refine_steps {
+            for direction in 0..3 {
+                for step in [tilt, -tilt] {
+                    let moved = Found { plane: shifted(&at.plane, direction, step), ..at };
+                    let gain = self.gain(pairs, &moved, scratch);
+                    if gain > at.gain {
+                        at = Found { gain, ..moved };
+                        break;
+                    }
+                }
+            }
+            tilt *= 0.5;
+        }
+        if let Some(plane) = self.tight(pairs, &at, ROOM[1], scratch) {
+            let tight = Found { plane, ..at };
+            let gain = self.gain(pairs, &tight, scratch);
+            if gain > at.gain * TIGHTER_IS_WORTH {
+                at = Found { gain, ..tight };
+            }
+        }
+        for bias in BIASES {
+            let other = Found { bias, ..at };
+            let gain = self.gain(pairs, &other, scratch);
+            if gain > at.gain {
+                at = Found { gain, ..other };
+            }
+        }
+        at
+    }
+
+    /// The texture that all pairs of the plane's window decide, and the window.
+    fn cast(&self, pairs: &PairTable, found: &Found, scratch: &mut Scratch) -> Cast {
+        let n = self.options.texels;
+        self.gain(pairs, found, scratch);
+        let votes = window_votes(pairs, n, scratch);
+        let mut blocked: Vec<u8> = smoothed(&votes, n).into_iter().map(|vote| u8::from(vote > 0.0)).collect();
+        blocked.resize(n * n + SPARE, 0);
+        Cast { blocked, window: scratch.gains.iter().map(|gain| *gain > 0.0).collect() }
+    }
+
+    /// The rectangle in the same plane, tight around what blocks in its window.
+    fn tight(&self, pairs: &PairTable, found: &Found, room: f32, scratch: &mut Scratch) -> Option<ShadowPlane> {
+        let n = self.options.texels;
+        self.gain(pairs, found, scratch);
+        let votes = window_votes(pairs, n, scratch);
+        let mut blocking = smoothed(&votes, n);
+        blocking.iter_mut().zip(&votes).for_each(|(s, v)| *s = if *s > 0.0 { v.max(0.0) } else { 0.0 });
+        Some(enlarged(&tight_around(&found.plane, &blocking, n)?, room))
+    }
+
+    /// Which pairs of the whole table the plane covers.
+    fn covered_by(&self, found: &Found, cast: &Cast) -> Vec<bool> {
+        let n = self.options.texels;
+        let of_light = |rows: &crate::pair_table::LightRows| {
+            let mut texels = vec![0u16; rows.end - rows.start];
+            if cast.window[rows.direction] {
+                self.table.crossings_of_light(rows, &found.plane, found.bias, (n, n), &mut texels);
+                texels.iter().map(|&texel| cast.blocked[texel as usize] != 0).collect()
+            } else {
+                vec![false; texels.len()]
+            }
+        };
+        let parts: Vec<Vec<bool>> = self.table.lights.par_iter().map(of_light).collect();
+        parts.concat()
+    }
+
+    /// Planes through the blockers of a few blocked pairs, drawn by their votes; rectangles across the whole model.
+    fn proposals(&self, pairs: &PairTable, seed: u64) -> Vec<ShadowPlane> {
+        let total: f64 = pairs.vote.iter().map(|vote| f64::from(vote.max(0.0))).sum();
+        let step = total * PER_BLOCKER as f64 / self.options.proposals.max(1) as f64;
+        let mut due = step * uniform(seed, 1);
+        let mut drawn = Vec::new();
+        for rows in &pairs.lights {
+            for i in rows.start..rows.end {
+                due -= f64::from(pairs.vote[i].max(0.0));
+                if due < 0.0 && pairs.vote[i] > 0.0 {
+                    due += step * (-due / step).ceil();
+                    drawn.push((pairs.point(i), rows.light));
+                }
+            }
+        }
+        let planes = |(k, (point, light)): (usize, &(Vec3, Vec3))| self.through_blocker(*point, *light, hash(seed, 2 + k as u64));
+        drawn.par_iter().enumerate().flat_map_iter(planes).collect()
+    }
+
+    fn through_blocker(&self, point: Vec3, light: Vec3, seed: u64) -> Vec<ShadowPlane> {
+        let Some(hit) = self.mesh.nearest(point + light * LOOKUP_OFFSET, light, |_, _| true) else { return Vec::new() };
+        let surface = self.mesh.normals[hit.triangle as usize];
+        let inward = if surface.dot(light) > 0.0 { surface } else { -surface };
+        let entry = point + light * (LOOKUP_OFFSET + hit.distance);
+        let thickness = self.mesh.nearest(ray_origin(entry, inward), inward, |_, _| true).map_or(0.0, |hit| hit.distance);
+        let middle = entry + inward * (0.5 * thickness.min(MAX_THICKNESS));
+        let (t, b) = surface.any_orthonormal_pair();
+        let (sin, cos) = (std::f64::consts::TAU * uniform(seed, 0)).sin_cos();
+        let across = t * cos as f32 + b * sin as f32;
+        let y = 2.0 * uniform(seed, 1) - 1.0;
+        let (sin, cos) = (std::f64::consts::TAU * uniform(seed, 2)).sin_cos();
+        let r = (1.0 - y * y).sqrt();
+        let any = Vec3::new((r * cos) as f32, y as f32, (r * sin) as f32);
+        let axis = Vec3::AXES[(hash(seed, 3) % 3) as usize];
+        let normals: [Vec3; PER_BLOCKER] = [surface, across, light, axis, any];
+        normals.iter().filter_map(|n| around_section(self.low, self.high, *n, n.dot(middle))).collect()
+    }
+}
+
+/// Planes proposed through one blocker.
+const PER_BLOCKER: usize = 5;
+
+/// Measures planes in parallel; the best first, the earlier one of equals.
+fn measured(
+    planes: Vec<ShadowPlane>,
+    measure: impl Fn(&ShadowPlane, &mut Scratch) -> Option<(f64, ShadowPlane)> + Sync,
+) -> Vec<(f64, ShadowPlane)> {
+    let mut scored: Vec<(f64, ShadowPlane)> =
+        planes.par_iter().map_init(Scratch::default, |scratch, plane| measure(plane, scratch)).flatten().collect();
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    scored
+}
+
+/// Drop of the weighted error by a plane with a texture of `n` x `n` that is read only where it gains, counted under
+/// lights that did not decide the texture. Leaves texels and gains per direction in `scratch`.
+fn windowed(pairs: &PairTable, plane: &ShadowPlane, bias: f32, n: usize, scratch: &mut Scratch) -> f64 {
+    pairs.crossings(plane, bias, (n, n), &mut scratch.texels);
+    let count = n * n + SPARE;
+    let Scratch { texels, votes, blocked, gains } = scratch;
+    gains.clear();
+    gains.resize(pairs.directions, 1.0);
+    for _ in 0..WINDOW_ROUNDS {
+        votes.clear();
+        votes.resize(2 * count, 0.0);
+        for rows in pairs.lights.iter().filter(|rows| gains[rows.direction] > 0.0) {
+            let votes = &mut votes[rows.fold * count..][..count];
+            for (&texel, &vote) in texels[rows.start..rows.end].iter().zip(&pairs.vote[rows.start..rows.end]) {
+                votes[texel as usize] += vote;
+            }
+        }
+        blocked.clear();
+        blocked.resize(2 * count, 0.0);
+        for fold in 0..2 {
+            let smooth = smoothed(&votes[fold * count..][..n * n], n);
+            for (blocked, vote) in blocked[fold * count..].iter_mut().zip(smooth) {
+                *blocked = f32::from(u8::from(vote > 0.0));
+            }
+        }
+        gains.fill(0.0);
+        for rows in &pairs.lights {
+            let blocked = &blocked[(1 - rows.fold) * count..][..count];
+            let pairs = texels[rows.start..rows.end].iter().zip(&pairs.vote[rows.start..rows.end]);
+            gains[rows.direction] += pairs.map(|(&texel, vote)| vote * blocked[texel as usize]).sum::<f32>();
+        }
+    }
+    gains.iter().map(|gain| f64::from(gain.max(0.0))).sum()
+}
+
+/// Votes per texel of all pairs in the window that [`windowed`] left in `scratch`.
+fn window_votes(pairs: &PairTable, n: usize, scratch: &Scratch) -> Vec<f32> {
+    let mut votes = vec![0.0f32; n * n + SPARE];
+    for rows in pairs.lights.iter().filter(|rows| scratch.gains[rows.direction] > 0.0) {
+        for (&texel, &vote) in scratch.texels[rows.start..rows.end].iter().zip(&pairs.vote[rows.start..rows.end]) {
+            votes[texel as usize] += vote;
+        }
+    }
+    votes.truncate(n * n);
+    votes
+}
