@@ -11,7 +11,7 @@ use shadowfit::{
 };
 use shadowfit_solver::{
     mesh::{Mesh, Sides},
-    plane::{BakedPlane, OccluderTexture, ShadowPlane, Side},
+    plane::{BakedPlane, BakedSet, Encoding, OccluderTexture, ShadowPlane, Side},
     shade::EDGE_ON,
 };
 use std::sync::LazyLock;
@@ -25,12 +25,17 @@ struct Twins<'a> {
 }
 
 impl<'a> Twins<'a> {
+    /// All planes in one section.
     fn new(scene: &'a Scene, mesh: &'a Mesh, planes: &[BakedPlane]) -> Self {
+        Self::with(scene, mesh, &BakedSet::one_section(planes.to_vec()))
+    }
+
+    fn with(scene: &'a Scene, mesh: &'a Mesh, set: &BakedSet) -> Self {
         static GPU: LazyLock<Gpu> = LazyLock::new(|| Gpu::new().expect("these tests need a graphics adapter"));
         let mut gpu = turntable::Turntable::new(&GPU, scene, &mesh.frame).expect("the scene fits");
-        gpu.set_planes(planes).expect("the planes fit");
+        gpu.set_planes(set).expect("the planes fit");
         let mut cpu = cpu::Turntable::new(scene, mesh);
-        cpu.set_planes(planes);
+        cpu.set_planes(set);
         Self { gpu, cpu }
     }
 
@@ -190,10 +195,11 @@ fn planes_are_drawn_through_the_model() {
 /// on a border of one texel in ten. Its normal u x v points down, so receivers below are in front of it.
 fn plate(y: f32, half: f32, side: Side) -> BakedPlane {
     let inside = |i: usize| (1..9).contains(&i);
-    let coverage = (0..100).map(|i| if inside(i % 10) && inside(i / 10) { 255 } else { 0 }).collect();
+    let texels = (0..100).map(|i| if inside(i % 10) && inside(i / 10) { 255 } else { 0 }).collect();
     let origin = Vec3::new(-half, y, -half);
     let plane = ShadowPlane { origin, u: Vec3::X * 2.0 * half, v: Vec3::Z * 2.0 * half };
-    BakedPlane { plane, texture: OccluderTexture { width: 10, height: 10, coverage }, side, bias: 1e-4 }
+    let texture = OccluderTexture { width: 10, height: 10, encoding: Encoding::Coverage, texels };
+    BakedPlane { plane, texture, side, bias: 1e-4 }
 }
 
 /// Is `q`, a point of the plate, in its blocking part? The filter crosses one half at the edge of a texel; but for

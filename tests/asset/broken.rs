@@ -21,7 +21,7 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
         ("planes/1/region", json!([-1, 0, 3, 3]), "planes/1/region"),
         ("planes/1/region", json!([0, 0, 2, 3]), "planes/1/region: the texture is 2 x 3"),
         ("planes/1/channel", json!("a"), "planes/1/channel: unknown variant `a`"),
-        ("planes/1/encoding", json!("sdf"), "planes/1/encoding: unknown variant `sdf`"),
+        ("planes/1/encoding", json!("msdf"), "planes/1/encoding: unknown variant `msdf`"),
         ("planes/1/side", json!("left"), "planes/1/side: unknown variant `left`"),
         ("planes/1/bias", json!(-1), "planes/1/bias"),
         ("planes", json!({}), "planes: not an array"),

@@ -8,7 +8,7 @@ use shadowfit::{
 };
 use shadowfit_solver::{
     mesh::Frame,
-    plane::{BakedPlane, OccluderTexture, ShadowPlane, Side},
+    plane::{BakedPlane, BakedSet, Encoding, OccluderTexture, ShadowPlane, Side},
 };
 use std::path::{Path, PathBuf};
 
@@ -54,13 +54,13 @@ impl Numbers {
 
 /// A texture with an open ring and noise inside.
 pub fn texture(width: usize, height: usize, numbers: &mut Numbers) -> OccluderTexture {
-    let mut coverage = vec![0; width * height];
+    let mut texels = vec![0; width * height];
     for y in 1..height - 1 {
         for x in 1..width - 1 {
-            coverage[y * width + x] = numbers.below(256) as u8;
+            texels[y * width + x] = numbers.below(256) as u8;
         }
     }
-    OccluderTexture { width, height, coverage }
+    OccluderTexture { width, height, encoding: Encoding::Coverage, texels }
 }
 
 pub fn planes(count: usize) -> Vec<BakedPlane> {
@@ -116,7 +116,13 @@ impl Folders {
 }
 
 pub fn write_to(input: &Path, out_dir: &Path, planes: &[BakedPlane]) -> Result<Written, AssetError> {
-    write(&AssetRequest { input, out_dir, stem: "m", frame: &FRAME, bounds: BOUNDS, planes })
+    let set = BakedSet::one_section(planes.to_vec());
+    write(&request(input, out_dir, &set))
+}
+
+/// A request without labels.
+pub fn request<'a>(input: &'a Path, out_dir: &'a Path, set: &'a BakedSet) -> AssetRequest<'a> {
+    AssetRequest { input, out_dir, stem: "m", frame: &FRAME, bounds: BOUNDS, set, origins: &[], section_of: &[] }
 }
 
 /// JSON text and binary chunk of a GLB file.

@@ -2,6 +2,7 @@
 
 use crate::fixtures::{Numbers, texture};
 use shadowfit::asset::atlas::{self, Layout, pack};
+use shadowfit_solver::plane::{Encoding, OccluderTexture};
 
 fn assert_disjoint(sizes: &[[u32; 2]], layout: &Layout) {
     assert_eq!(layout.placements.len(), sizes.len());
@@ -75,14 +76,14 @@ fn textures_that_would_bleed_or_break_are_refused() {
     let good = texture(8, 6, &mut numbers);
     for (i, at) in [(0, "(0, 0)"), (7, "(7, 0)"), (40, "(0, 5)"), (23, "(7, 2)")] {
         let mut bad = good.clone();
-        bad.coverage[i] = 1;
+        bad.texels[i] = 1;
         let error = atlas::build(&[&good, &bad]).unwrap_err();
         assert!(error.to_string().contains("shadow plane 1") && error.to_string().contains(at), "{error}");
         assert_eq!(error.exit_code(), 4);
     }
     let mut short = good.clone();
-    short.coverage.pop();
+    short.texels.pop();
     assert!(atlas::build(&[&short]).is_err());
-    let thin = shadowfit_solver::plane::OccluderTexture { width: 2, height: 5, coverage: vec![0; 10] };
+    let thin = OccluderTexture { width: 2, height: 5, encoding: Encoding::Coverage, texels: vec![0; 10] };
     assert!(atlas::build(&[&thin]).is_err());
 }
