@@ -194,8 +194,6 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
     time_s.validate = clock.lap();
     time_s.total = start.elapsed().as_secs_f64();
 
-    let mut files = vec![written.model.clone(), written.sidecar.clone()];
-    files.extend(written.atlases.iter().map(|atlas| atlas.path.clone()).chain(written.buffer.clone()));
     let mut report = Report {
         schema: SCHEMA,
         version: env!("CARGO_PKG_VERSION"),
@@ -217,7 +215,7 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
         skipped: skipped(&scene, &mesh, &written.not_copied),
         max_error: request.max_error,
         command: request.command.clone(),
-        files: files.iter().map(|path| path.display().to_string()).collect(),
+        files: written.files().map(|path| path.display().to_string()).collect(),
     };
     write_report(&mut report, out_dir, &stem, proof.picture)?;
     Ok(report)

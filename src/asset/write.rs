@@ -86,6 +86,12 @@ pub struct Written {
 }
 
 impl Written {
+    /// All files but copies.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let atlases = self.atlases.iter().map(|atlas| &atlas.path);
+        [&self.model, &self.sidecar].into_iter().chain(atlases).chain(&self.buffer).map(PathBuf::as_path)
+    }
+
     /// Bytes of the atlases as PNG files.
     #[must_use]
     pub fn png_bytes(&self) -> u64 {
