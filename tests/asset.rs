@@ -131,6 +131,31 @@ fn a_moved_frame_node_moves_its_planes() {
     assert_eq!(after.bounds, Bounds { min: DVec3::new(-2.0, 0.0, 7.0), max: DVec3::new(2.0, 4.0, 10.0 + 2e-7) });
 }
 
+/// A direction towards the light turns with the model like any vector, also under a scale that differs by axis.
+#[test]
+fn a_moved_frame_node_turns_the_directions() {
+    let folders = Folders::new();
+    let input = folders.input("m.glb", &glb(&document("", ""), Some(&triangle())));
+    let (set, out) = (fixtures::active_set(planes(3)), folders.out());
+    let written = write(&fixtures::request(&input, &out, &set)).unwrap();
+    let before = set.active.unwrap();
+    assert_eq!(read(&written.model).unwrap().active.as_ref(), Some(&before), "not to the last bit");
+    assert_eq!(read(&written.sidecar).unwrap().active.as_ref(), Some(&before), "not to the last bit");
+    let (json, bin) = fixtures::open(&written.model);
+    // A quarter turn around y after a scale: (x, y, z) becomes (z, 3 y, -2 x).
+    let turned = json.replace(
+        "\"name\":\"shadow planes\"",
+        "\"rotation\":[0,0.7071067811865476,0,0.7071067811865476],\"scale\":[2,3,1],\"name\":\"shadow planes\"",
+    );
+    let path = folders.input("turned.glb", &glb(&turned, bin.as_deref()));
+    let after = read(&path).unwrap().active.unwrap();
+    assert_eq!(after.lists, before.lists);
+    for (a, b) in before.directions.iter().zip(&after.directions) {
+        let expected = Vec3::new(a.z, 3.0 * a.y, -2.0 * a.x).normalize();
+        assert!(b.distance(expected) < 1e-6 && (b.length() - 1.0).abs() < 1e-6, "{a} became {b}, not {expected}");
+    }
+}
+
 #[test]
 fn unit_space_planes_cast_the_same_shadow() {
     let folders = Folders::new();

@@ -58,7 +58,8 @@ pub fn set(sections: u32) -> BakedSet {
     let whole: Vec<Vec<u32>> = (0..sections).map(|section| vec![section, section + 1, section + 2]).collect();
     let unit = |i: u64| shadowfit_solver::lights::direction(i as f32 * 0.7, (i as f32 * 0.31).sin());
     let some = |i: u64| {
-        let part = |list: &Vec<u32>| list.iter().copied().filter(|plane| (u64::from(*plane) + i) % 2 == 0).collect();
+        let part =
+            |list: &Vec<u32>| list.iter().copied().filter(|plane| (u64::from(*plane) + i).is_multiple_of(2)).collect();
         whole.iter().map(part).collect()
     };
     let active = ActiveLists { directions: (0..7).map(unit).collect(), lists: (0..7).map(some).collect() };

@@ -8,7 +8,7 @@ use shadowfit::{
 };
 use shadowfit_solver::{
     mesh::Frame,
-    plane::{BakedPlane, BakedSet, Encoding, OccluderTexture, ShadowPlane, Side},
+    plane::{ActiveLists, BakedPlane, BakedSet, Encoding, OccluderTexture, ShadowPlane, Side},
 };
 use std::path::{Path, PathBuf};
 
@@ -118,6 +118,13 @@ impl Folders {
 pub fn write_to(input: &Path, out_dir: &Path, planes: &[BakedPlane]) -> Result<Written, AssetError> {
     let set = BakedSet::one_section(planes.to_vec());
     write(&request(input, out_dir, &set))
+}
+
+/// One section with active lists of two directions.
+pub fn active_set(planes: Vec<BakedPlane>) -> BakedSet {
+    let directions = vec![Vec3::new(0.1, 0.7, -0.3).normalize(), Vec3::new(-0.2, -0.4, 0.9).normalize()];
+    let lists = vec![vec![vec![0, 2]], vec![vec![1]]];
+    BakedSet { active: Some(ActiveLists { directions, lists }), ..BakedSet::one_section(planes) }
 }
 
 /// A request without labels.

@@ -51,6 +51,44 @@ fn large_sets_use_several_atlases() {
     assert!(layout.atlases.iter().flatten().all(|&side| side <= atlas::MAX_SIDE_PX));
 }
 
+/// Hundreds of small textures, as sections have them: the rest of a row hardly counts.
+#[test]
+fn many_small_textures_fill_the_atlas() {
+    let mut numbers = Numbers(11);
+    for count in [300, 2000] {
+        let sizes: Vec<[u32; 2]> =
+            (0..count).map(|_| [10 + numbers.below(51) as u32, 10 + numbers.below(51) as u32]).collect();
+        let start = std::time::Instant::now();
+        let layout = pack(&sizes).unwrap();
+        let seconds = start.elapsed().as_secs_f64();
+        assert_disjoint(&sizes, &layout);
+        let texels: u64 = sizes.iter().map(|[w, h]| u64::from(w * h)).sum();
+        let fill = texels as f64 / layout.texture_bytes() as f64;
+        println!("{count} textures: {:?}, {:.1} % full, {seconds:.3} s", layout.atlases, 100.0 * fill);
+        assert!(fill >= 0.9, "{count} textures: {fill}");
+    }
+}
+
+#[test]
+fn equal_textures_share_a_region() {
+    let mut numbers = Numbers(5);
+    let (a, b) = (texture(20, 9, &mut numbers), texture(5, 30, &mut numbers));
+    let mut field = a.clone();
+    field.encoding = Encoding::Sdf;
+    field.texels.iter_mut().for_each(|texel| *texel /= 3);
+    // The same bytes read in another way, and the same bytes in another shape, are other textures.
+    let mut flat = field.clone();
+    flat.encoding = Encoding::Coverage;
+    let wide = OccluderTexture { width: 30, height: 5, encoding: Encoding::Coverage, texels: vec![0; 150] };
+    let tall = OccluderTexture { width: 5, height: 30, ..wide.clone() };
+    let list = [&a, &b, &a.clone(), &field, &flat, &b, &wide, &tall, &wide];
+    let (layout, atlases) = atlas::build(&list).unwrap();
+    let place = &layout.placements;
+    assert_eq!([place[2], place[5], place[8]], [place[0], place[1], place[6]]);
+    let places: std::collections::BTreeSet<_> = place.iter().map(|p| (p.atlas, p.channel as usize, p.x, p.y)).collect();
+    assert_eq!((places.len(), atlases.len()), (6, 1));
+}
+
 #[test]
 fn atlases_are_plain_rgb_png_files() {
     let mut numbers = Numbers(3);
