@@ -9,7 +9,6 @@ use crate::{
     validation::{ImageErrors, ValidationOptions, validate},
 };
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 use shadowfit_solver::{
     bake::{BakeOptions, bake},
     candidates::{CandidateOptions, generate},
@@ -21,8 +20,7 @@ use shadowfit_solver::{
     rectangle::Turn,
     sampling::hash,
     selection::{SelectionOptions, Verdict, select},
-    shade::set_rows,
-    visibility::{LightPairs, Pairs, trace},
+    visibility::{Pairs, trace},
     votes::{Mask, best_bias},
 };
 use std::{
@@ -245,7 +243,8 @@ fn prove(request: &FitRequest, mesh: &Mesh, fitted: &Fitted, written: &Path, sea
     let section_of = receiver_sections(mesh, &receivers, &scene.section_of);
     let held_out = measure(&set, &pairs, &section_of);
     let curve = curve(fitted, &pairs, (set.planes.len(), &held_out), search_s);
-    let mut proof = Proof { held_out, lookups: lookups(&set, &pairs, &section_of), curve, image: None, picture: None };
+    let mut proof =
+        Proof { held_out, lookups: Lookups::measure(&set, &pairs, &section_of), curve, image: None, picture: None };
     if let Some(options) = &request.validation {
         let lights = validation_lights(request, &held_out, options.lights);
         let validation = validate((&scene, mesh), &set, &lights, options)?;
@@ -255,7 +254,8 @@ fn prove(request: &FitRequest, mesh: &Mesh, fitted: &Fitted, written: &Path, sea
 }
 
 /// The section of each receiver, from that of each triangle of the scene.
-fn receiver_sections(mesh: &Mesh, receivers: &Receivers, section_of: &[u32]) -> Vec<u32> {
+#[must_use]
+pub fn receiver_sections(mesh: &Mesh, receivers: &Receivers, section_of: &[u32]) -> Vec<u32> {
     receivers.triangles.iter().map(|&triangle| section_of[mesh.source[triangle as usize] as usize]).collect()
 }
 
@@ -363,25 +363,6 @@ fn curve(fitted: &Fitted, pairs: &Pairs, (planes, result): (usize, &Metrics), se
     });
     let result = (planes > 0).then(|| CurvePoint::new(planes, result, seconds));
     std::iter::once(none).chain(greedy).chain(result).collect()
-}
-
-/// Planes that can cast in the list of a receiver's section: the mean over all pairs, each with its weight, and the
-/// most that any pair meets. `section_of` has one entry a receiver.
-fn lookups(set: &BakedSet, pairs: &Pairs, section_of: &[u32]) -> Lookups {
-    let of_light = |light: &LightPairs| {
-        let rows = set_rows(set, light.light);
-        let casting = |list: &Vec<u32>| list.iter().filter(|&&plane| rows[plane as usize].is_some()).count();
-        let read: Vec<usize> = set.lists(light.light).iter().map(casting).collect();
-        let (mut sum, mut weight, mut max) = (0.0, 0.0, 0);
-        for (&receiver, vote) in light.receiver.iter().zip(&light.vote) {
-            let (count, vote) = (read[section_of[receiver as usize] as usize], f64::from(vote.abs()));
-            (sum, weight, max) = (sum + count as f64 * vote, weight + vote, max.max(count));
-        }
-        (sum, weight, max)
-    };
-    let lights: Vec<_> = pairs.lights.par_iter().map(of_light).collect();
-    let (sum, weight, max) = lights.iter().fold((0.0, 0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1, a.2.max(b.2)));
-    Lookups { mean: if weight > 0.0 { sum / weight } else { 0.0 }, max }
 }
 
 /// Box of the receivers in model space; of the model where nothing is seen.

@@ -7,6 +7,8 @@
 mod build;
 #[path = "sections/labels.rs"]
 mod labels;
+#[path = "sections/measured.rs"]
+mod measured;
 #[path = "sections/meshes.rs"]
 mod meshes;
 #[path = "sections/round_trip.rs"]
