@@ -152,7 +152,8 @@ fn sectioned(scene: &mut Scene) -> BakedSet {
         // A step of the coverage's bytes is the field's border; below it the field is open, as at the ring.
         baked.texture.encoding = Encoding::Sdf;
     }
-    let list = |section: u32, step: u32| (0..7).filter(|plane| (plane + section) % step == 0).collect::<Vec<u32>>();
+    let list =
+        |section: u32, step: u32| (0..7).filter(|plane| (plane + section).is_multiple_of(step)).collect::<Vec<u32>>();
     let sections: Vec<Vec<u32>> = (0..7).map(|section| list(section, 1)).collect();
     let directions = vec![Vec3::Y, Vec3::X, Vec3::NEG_X, Vec3::Z];
     let of = |direction: u32| (0..7).map(|section| list(section, 2 + direction)).collect();

@@ -7,9 +7,17 @@ use crate::{
     round_trip,
 };
 use serde_json::{Value, json};
-use shadowfit::{gltf_file::SECTION_ATTRIBUTE, scene::Origin};
+use shadowfit::{
+    asset::check_input,
+    gltf_file::SECTION_ATTRIBUTE,
+    scene::{Origin, load},
+};
 use shadowfit_solver::sampling::hash;
-use std::{collections::BTreeSet, fs, path::Path};
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+};
 
 /// Three sections in stripes of four triangles.
 fn striped(origin: Origin) -> u32 {
@@ -214,7 +222,15 @@ fn stale_labels_and_attributes_that_cannot_be_read_do_no_harm() {
     round_trip(&input, &folder.path().join("one"), 1, |_| 0);
 }
 
-/// The project's own models with labels by chance: whole primitives, stripes, and every triangle for itself.
+/// A section by chance for every run of triangles.
+fn by_chance(seed: u64, run: u32, count: u32) -> impl Fn(Origin) -> u32 {
+    move |origin| {
+        let stripe = u64::from(origin.triangle / run) << 20 | u64::from(origin.primitive) << 10;
+        (hash(seed, stripe | u64::from(origin.mesh)) % u64::from(count)) as u32
+    }
+}
+
+/// The project's own models with labels by chance: every triangle for itself, stripes, whole primitives.
 #[test]
 fn labels_by_chance_come_back() {
     let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
@@ -227,11 +243,35 @@ fn labels_by_chance_come_back() {
         for (round, run) in [1, 7, 400].into_iter().enumerate() {
             let seed = (100 * i + round) as u64;
             let count = 2 + (hash(seed, 0) % 30) as u32;
-            let section = |origin: Origin| {
-                let stripe = u64::from(origin.triangle / run) << 20 | u64::from(origin.primitive) << 10;
-                (hash(seed, stripe | u64::from(origin.mesh)) % u64::from(count)) as u32
-            };
-            round_trip(input, &for_validator(&format!("{name}-{run}")), count, section);
+            round_trip(input, &for_validator(&format!("{name}-{run}")), count, by_chance(seed, run, count));
         }
     }
+}
+
+/// The same with the models of `SHADOWFIT_CORPUS`, those that can be read.
+#[test]
+fn labels_by_chance_come_back_from_the_corpus() {
+    let Some(corpus) = std::env::var_os("SHADOWFIT_CORPUS") else {
+        println!("corpus: not run, SHADOWFIT_CORPUS is not set");
+        return;
+    };
+    let (mut open, mut models) = (vec![PathBuf::from(corpus)], Vec::new());
+    while let Some(folder) = open.pop() {
+        for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            match path.extension().and_then(|ending| ending.to_str()) {
+                _ if path.is_dir() => open.push(path),
+                Some("glb" | "gltf") => models.push(path),
+                _ => {}
+            }
+        }
+    }
+    models.retain(|path| check_input(path).is_ok() && load(path).is_ok());
+    models.sort();
+    for (i, input) in models.iter().enumerate() {
+        println!("{}", input.display());
+        let folder = tempfile::tempdir().unwrap();
+        round_trip(input, folder.path(), 9, by_chance(i as u64, 5, 9));
+    }
+    println!("corpus: {} models", models.len());
+    assert!(!models.is_empty());
 }
