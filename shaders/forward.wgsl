@@ -22,6 +22,7 @@ struct Vertex {
     @location(2) shading_normal: vec3f,
     @location(3) uv: vec2f,
     @location(4) material: u32,
+    @location(5) section: u32,
 }
 
 // Centroid: with several samples a pixel's centre may lie off the triangle.
@@ -32,12 +33,22 @@ struct Surface {
     @location(2) @interpolate(perspective, centroid) shading_normal: vec3f,
     @location(3) @interpolate(perspective, centroid) uv: vec2f,
     @location(4) @interpolate(flat) material: u32,
+    @location(5) @interpolate(flat) section: u32,
 }
 
 @vertex
 fn vs_surface(vertex: Vertex) -> Surface {
     let clip = frame.clip_from_unit * vec4f(vertex.p, 1.0);
-    return Surface(clip, vertex.p, vertex.geometric_normal, vertex.shading_normal, vertex.uv, vertex.material);
+    let section = min(vertex.section, frame.section_count);
+    return Surface(
+        clip,
+        vertex.p,
+        vertex.geometric_normal,
+        vertex.shading_normal,
+        vertex.uv,
+        vertex.material,
+        section,
+    );
 }
 
 // The opposite of Cutout::is_solid in solver/src/mesh.rs: nearest texel, so that holes are where the traced reference
@@ -56,11 +67,11 @@ fn faces_light(surface: Surface, side: f32) -> bool {
     return dot(side * surface.geometric_normal, towards_light(surface.p)) > 0.0;
 }
 
-fn predicted_visibility(p: vec3f) -> f32 {
+fn predicted_visibility(surface: Surface) -> f32 {
     if POINT_LIGHT {
-        return visibility_point_light(frame.light.xyz, p);
+        return visibility_point_light(surface.section, frame.light.xyz, surface.p);
     }
-    return visibility(p);
+    return visibility(surface.section, surface.p);
 }
 
 // Linear Lambert colour; `side` is 1 for the front and -1 for the back.
@@ -71,7 +82,7 @@ fn shade(surface: Surface, side: f32) -> vec3f {
     let n_dot_l = dot(n, normalize(towards_light(surface.p)));
     var direct = 0.0;
     if n_dot_l > 0.0 && faces_light(surface, side) {
-        direct = n_dot_l * predicted_visibility(surface.p);
+        direct = n_dot_l * predicted_visibility(surface);
     }
     return base * (AMBIENT + DIFFUSE * direct);
 }
@@ -92,7 +103,7 @@ fn fs_mask(surface: Surface, @builtin(front_facing) front: bool) -> @location(0)
     if !faces_light(surface, select(-1.0, 1.0, front)) {
         return vec4f(0.0, 0.0, 1.0, 1.0);
     }
-    return vec4f(predicted_visibility(surface.p), 1.0, 1.0, 1.0);
+    return vec4f(predicted_visibility(surface), 1.0, 1.0, 1.0);
 }
 
 // Half the width of a cut's line, pixels.

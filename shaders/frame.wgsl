@@ -7,10 +7,10 @@ struct Frame {
     clip_from_unit: mat4x4f,
     // xyz: unit vector towards the light, or the light's position in unit space (POINT_LIGHT).
     light: vec4f,
-    // Planes in `casting`; those that cast nothing under this light are not in the list.
-    casting_count: u32,
     // Planes in `rectangles`: all.
     rectangle_count: u32,
+    // Sections in `lists`, without the empty one behind them.
+    section_count: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -3,12 +3,17 @@
 // |n.l| below which a plane casts nothing; shade::EDGE_ON.
 override EDGE_ON: f32;
 
+// The value from which a distance field blocks; plane::SDF_BORDER.
+override SDF_BORDER: f32;
+
 // Where an occluder texture lies in the atlas.
 struct OccluderSlot {
     // x, y, width, height in texels.
     region: vec4f,
     layer: u32,
     channel: u32,
+    // 0: coverage, 1: a distance field.
+    encoding: u32,
 }
 
 // A plane that casts under this light. Directional light: the three rows of shade::PlaneRows, affine in the
@@ -30,9 +35,13 @@ struct Crossing {
     casts: bool,
 }
 
+// The planes that some list below names.
 @group(0) @binding(1) var<storage, read> casting: array<CastingPlane>;
 @group(0) @binding(2) var occluders: texture_2d_array<f32>;
 @group(0) @binding(3) var occluder_sampler: sampler;
+// The planes that each section reads under this light: first two numbers a section, where its list starts and ends,
+// then the lists, indices into `casting`. The last section stands for triangles that belong to none; its list is empty.
+@group(0) @binding(5) var<storage, read> lists: array<u32>;
 
 // Where the ray from p towards a directional light crosses the plane beyond its bias.
 fn crossing(plane: CastingPlane, p: vec3f) -> Crossing {
@@ -59,33 +68,40 @@ fn crossing_point_light(plane: CastingPlane, c: vec3f, p: vec3f) -> Crossing {
     return Crossing(ab, s * distance > plane.bias && all(ab >= vec2f(0.0)) && all(ab <= vec2f(1.0)));
 }
 
-// Bilinear coverage 0..1 at ab in 0..1, taps clamped to the region.
+// How much of the light is blocked, 0..1, at ab in 0..1: the bilinear value, taps clamped to the region; of a distance
+// field, whether that reaches its border.
 fn sample(slot: OccluderSlot, ab: vec2f) -> f32 {
     let size = slot.region.zw;
     let texel = slot.region.xy + clamp(ab * size, vec2f(0.5), size - 0.5);
     let uv = texel / vec2f(textureDimensions(occluders));
-    return textureSampleLevel(occluders, occluder_sampler, uv, slot.layer, 0.0)[slot.channel];
+    let value = textureSampleLevel(occluders, occluder_sampler, uv, slot.layer, 0.0)[slot.channel];
+    return select(value, f32(value >= SDF_BORDER), slot.encoding == 1u);
 }
 
-// Predicted visibility of a receiver at p under a directional light: left as soon as one plane blocks.
-fn visibility(p: vec3f) -> f32 {
+// Predicted visibility of a receiver at p, on a surface of that section, under a directional light: left as soon as one
+// plane blocks.
+fn visibility(section: u32, p: vec3f) -> f32 {
     var v = 1.0;
-    for (var i = 0u; i < frame.casting_count && v > 0.0; i++) {
-        let hit = crossing(casting[i], p);
+    let end = lists[2u * section + 1u];
+    for (var i = lists[2u * section]; i < end && v > 0.0; i++) {
+        let plane = lists[i];
+        let hit = crossing(casting[plane], p);
         if hit.casts {
-            v *= 1.0 - sample(casting[i].slot, hit.ab);
+            v *= 1.0 - sample(casting[plane].slot, hit.ab);
         }
     }
     return v;
 }
 
-// Predicted visibility of a receiver at p under a point light at c.
-fn visibility_point_light(c: vec3f, p: vec3f) -> f32 {
+// The same under a point light at c.
+fn visibility_point_light(section: u32, c: vec3f, p: vec3f) -> f32 {
     var v = 1.0;
-    for (var i = 0u; i < frame.casting_count && v > 0.0; i++) {
-        let hit = crossing_point_light(casting[i], c, p);
+    let end = lists[2u * section + 1u];
+    for (var i = lists[2u * section]; i < end && v > 0.0; i++) {
+        let plane = lists[i];
+        let hit = crossing_point_light(casting[plane], c, p);
         if hit.casts {
-            v *= 1.0 - sample(casting[i].slot, hit.ab);
+            v *= 1.0 - sample(casting[plane].slot, hit.ab);
         }
     }
     return v;

@@ -3,38 +3,42 @@
 //! [`write()`] takes an input model and baked planes and writes, into one folder, `STEM.shadow.glb` (the input
 //! with the glTF extension [`EXTENSION`]), `STEM.shadow.json` (the same set of planes with `uri`s in the place of
 //! texture indices) and `STEM.atlas-0.png`, ... [`read()`] takes any of these, checks it, and gives the set back.
-//! [`read_plane_file`] reads rectangles that a person placed.
+//! Where there are several sections, the primitives of the GLB say which they belong to (`labels`); the scene's reader
+//! gives that back. [`read_plane_file`] reads rectangles that a person placed.
 //!
 //! Numbers in the files are in model space, metres, f64 in the shortest spelling that stands for them; the solver's are
 //! in unit space and f32. No planes is legal and means "no self-shadow": the set is there, without textures.
 //!
-//! Guaranteed: every other byte of the input's JSON and buffers is kept (only `buffers[0].byteLength` changes);
-//! the input is never overwritten; files appear complete or not at all; the same request gives the same bytes.
+//! Guaranteed: every other byte of the input's JSON and buffers is kept (only `buffers[0].byteLength` changes, and
+//! what a primitive of several sections refers to); the input is never overwritten; files appear complete or not at all; the same request gives the same bytes.
 //! Not done: an input that carries the extension already is refused rather than edited, since its textures
 //! could only be left behind as dead weight. Fit the model that it was made from.
 
 pub mod atlas;
+mod document;
+mod extension;
 pub mod files;
+mod labels;
 mod pointer;
 mod read;
 pub mod splice;
 mod write;
 
 pub use atlas::Channel;
+pub use extension::{ActiveEntry, Extension, PlaneEntry, PlaneSet, TextureRef};
 pub use read::{ModelRectangle, read, read_plane_file};
 pub use write::{AssetRequest, Written, WrittenAtlas, check_input, check_outputs, write};
 
+pub use crate::gltf_file::EXTENSION;
+
 use crate::gltf_file::Invalid;
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use shadowfit_solver::{
     mesh::Frame,
-    plane::{BakedPlane, OccluderTexture, ShadowPlane, Side},
+    plane::{ActiveLists, BakedPlane, BakedSet, OccluderTexture, SectionLists, ShadowPlane, Side},
 };
 use std::path::{Path, PathBuf};
-
-/// Name of the glTF extension. Listed in `extensionsUsed`, never in `extensionsRequired`.
-pub const EXTENSION: &str = "SHADOWFIT_node_shadow_planes";
 
 /// Axes whose angle has a smaller sine count as parallel. At 1e-6 (0.2 arc seconds) the rounding of f32 axes is
 /// already a tenth of the angle; a sheared node in a real file stays above 1e-2.
@@ -49,71 +53,11 @@ pub struct Bounds {
     pub max: DVec3,
 }
 
-/// How a texel is to be read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Encoding {
-    /// 0 is open, 255 blocks, bilinear in between.
-    Coverage,
-}
-
 impl Bounds {
     /// Finite, and no side negative.
     fn is_box(&self) -> bool {
         self.min.is_finite() && self.max.is_finite() && self.min.cmple(self.max).all()
     }
-}
-
-/// The extension's root object, and the whole of the sidecar.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Extension {
-    /// One set a model.
-    pub sets: Vec<PlaneSet>,
-}
-
-/// The planes of one model, as the file spells them.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PlaneSet {
-    /// Box of the receivers at bake time.
-    pub bounds: Bounds,
-    /// All planes.
-    pub planes: Vec<PlaneEntry>,
-    /// Indices into `planes`, one list a section.
-    pub sections: Vec<Vec<usize>>,
-}
-
-/// One plane, as the file spells it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "camelCase")]
-pub struct PlaneEntry {
-    /// Where texel (0, 0) starts.
-    pub origin: DVec3,
-    /// Edge along the texture's rows, full length.
-    pub u_axis: DVec3,
-    /// Edge along the texture's columns, full length.
-    pub v_axis: DVec3,
-    /// The atlas.
-    pub occluder_texture: TextureRef,
-    /// `[x, y, width, height]` in the atlas, texels.
-    pub region: [u32; 4],
-    /// The atlas's channel.
-    pub channel: Channel,
-    /// What a texel means.
-    pub encoding: Encoding,
-    /// Which receivers the plane serves.
-    pub side: Side,
-    /// A receiver nearer than this along the ray is not shadowed, metres.
-    pub bias: f64,
-}
-
-/// Which picture holds a texture: `{"index": 0}` in glTF, `{"uri": ".."}` in the sidecar.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum TextureRef {
-    /// Index into the document's `textures`.
-    Index(usize),
-    /// Percent-encoded path relative to the sidecar.
-    Uri(String),
 }
 
 /// A rectangle (or parallelogram) in model space, metres.
@@ -182,21 +126,28 @@ pub struct ShadowSet {
     pub bounds: Bounds,
     /// All planes; empty means "no self-shadow".
     pub planes: Vec<ModelPlane>,
-    /// Indices into `planes`, one list a section.
-    pub sections: Vec<Vec<usize>>,
+    /// Indices into `planes`, one list a section; at least one section.
+    pub sections: SectionLists,
+    /// Shorter lists per light direction, where there are such; directions in model space.
+    pub active: Option<ActiveLists>,
 }
 
 impl ShadowSet {
     /// The planes as the solver and the renderer use them.
     #[must_use]
-    pub fn in_unit_space(&self, frame: &Frame) -> Vec<BakedPlane> {
+    pub fn in_unit_space(&self, frame: &Frame) -> BakedSet {
         let baked = |plane: &ModelPlane| BakedPlane {
             plane: plane.rectangle.in_unit_space(frame),
             texture: plane.texture.clone(),
             side: plane.side,
             bias: (plane.bias / frame.radius) as f32,
         };
-        self.planes.iter().map(baked).collect()
+        // Unit space is moved and scaled: directions stay.
+        BakedSet {
+            planes: self.planes.iter().map(baked).collect(),
+            sections: self.sections.clone(),
+            active: self.active.clone(),
+        }
     }
 }
 
@@ -265,6 +216,12 @@ pub enum AssetError {
         /// What is wrong.
         why: String,
     },
+    /// Sections or active lists that do not fit the planes or the model.
+    #[error("sections: {why}")]
+    Sections {
+        /// What is wrong.
+        why: String,
+    },
     /// The receivers' box is empty or not finite.
     #[error("the receivers' box is not one: {bounds:?}")]
     Bounds {
@@ -289,7 +246,7 @@ impl AssetError {
         match self {
             Self::Io { .. } | Self::OverwritesInput { .. } | Self::Occupied { .. } => 2,
             Self::Malformed { .. } | Self::Invalid { .. } | Self::AlreadyFitted { .. } | Self::Stem { .. } => 3,
-            Self::Plane { .. } | Self::Bounds { .. } | Self::Encode(_) => 4,
+            Self::Plane { .. } | Self::Sections { .. } | Self::Bounds { .. } | Self::Encode(_) => 4,
         }
     }
 }

@@ -240,7 +240,7 @@ fn render(args: &RenderArgs) -> Result<(), CliError> {
     }
     let scene = scene::load(&args.asset).map_err(FitError::Scene)?;
     let mesh = Mesh::new(&scene.soup).map_err(|source| FitError::Mesh { path: args.asset.clone(), source })?;
-    let planes = asset::read(&args.asset).map_err(FitError::Asset)?.in_unit_space(&mesh.frame);
+    let set = asset::read(&args.asset).map_err(FitError::Asset)?.in_unit_space(&mesh.frame);
     let (mode, antialias) = match args.mode {
         Picture::Shaded => (Mode::Shaded, Antialias::Msaa4),
         Picture::Mask => (Mode::Mask, Antialias::Off),
@@ -253,14 +253,14 @@ fn render(args: &RenderArgs) -> Result<(), CliError> {
     };
     let on_gpu = || {
         let mut turntable = turntable::Turntable::new(&Gpu::new()?, &scene, &mesh.frame)?;
-        turntable.set_planes(&planes)?;
+        turntable.set_planes(&set)?;
         turntable.render(&request)
     };
     let picture = match on_gpu() {
         Err(RenderError::NoAdapter | RenderError::Device { .. } | RenderError::TooLarge { .. }) => {
             tracing::warn!("no graphics adapter can draw this: drawing with the CPU");
             let mut turntable = cpu::Turntable::new(&scene, &mesh);
-            turntable.set_planes(&planes);
+            turntable.set_planes(&set);
             turntable.render(&request)
         }
         outcome => outcome,

@@ -18,6 +18,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
+/// Name of the glTF extension of shadow planes. Listed in `extensionsUsed`, never in `extensionsRequired`.
+pub const EXTENSION: &str = "SHADOWFIT_node_shadow_planes";
+
+/// Name of the vertex attribute that tells the sections of a primitive's triangles apart: a scalar, the same at the
+/// three corners of a triangle.
+pub const SECTION_ATTRIBUTE: &str = "_SHADOW_SECTION";
+
 /// Largest file that is read, bytes: a GLB cannot be longer (its length is a 32-bit number), and a sparse file
 /// or a wrong mount must not fill the memory.
 pub const MAX_FILE_BYTES: u64 = u32::MAX as u64;

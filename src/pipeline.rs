@@ -15,12 +15,11 @@ use shadowfit_solver::{
     lights::LightDomain,
     mesh::{Mesh, MeshError},
     metrics::{Metrics, measure},
-    plane::BakedPlane,
+    plane::{BakedPlane, BakedSet},
     receivers::{ReceiverOptions, Receivers, sample},
     rectangle::Turn,
     sampling::hash,
     selection::{SelectionOptions, Verdict, select},
-    shade::plane_rows,
     visibility::{Pairs, trace},
     votes::{Mask, best_bias},
 };
@@ -139,7 +138,9 @@ impl Clock {
 
 /// What the search and the bake leave behind.
 struct Fitted {
-    planes: Vec<BakedPlane>,
+    set: BakedSet,
+    /// The section of each triangle of the scene.
+    section_of: Vec<u32>,
     /// The greedy phase's planes, baked in order: the first k are its answer for k planes.
     greedy: Vec<BakedPlane>,
     /// Seconds into the search at which each greedy plane was found.
@@ -168,7 +169,7 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
     let pairs = trace(&mesh, &receivers, &lights, request.domain.solid_angle());
     time_s.reference = clock.lap();
 
-    let fitted = fit(request, &mesh, &pairs, progress, (&mut clock, &mut time_s))?;
+    let fitted = fit(request, (&mesh, scene.section_of.len()), &pairs, progress, (&mut clock, &mut time_s))?;
 
     progress("writing the asset".to_string());
     let stem = stem_of(&request.model);
@@ -179,18 +180,18 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
         stem: &stem,
         frame: &mesh.frame,
         bounds,
-        planes: &fitted.planes,
+        set: &fitted.set,
+        origins: &scene.origins,
+        section_of: &fitted.section_of,
     };
     let written = asset::write(&asset_request)?;
     time_s.write = clock.lap();
 
     progress("validating what was written".to_string());
-    let proof = prove(request, (&scene, &mesh), &fitted, &written.model, time_s.search)?;
+    let proof = prove(request, &mesh, &fitted, &written.model, time_s.search)?;
     time_s.validate = clock.lap();
     time_s.total = start.elapsed().as_secs_f64();
 
-    let mut files = vec![written.model.clone(), written.sidecar.clone()];
-    files.extend(written.atlases.iter().map(|atlas| atlas.path.clone()));
     let mut report = Report {
         schema: SCHEMA,
         version: env!("CARGO_PKG_VERSION"),
@@ -198,12 +199,12 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
         triangles: mesh.triangle_count(),
         seed: request.seed,
         light_domain: request.domain_text.clone(),
-        planes: fitted.planes.len(),
-        sections: 1,
+        planes: fitted.set.planes.len(),
+        sections: fitted.set.sections.len(),
         lookups: proof.lookups,
         texture_bytes: written.texture_bytes,
         held_out: proof.held_out,
-        training: measure(&fitted.planes, &pairs),
+        training: measure(&fitted.set, &pairs, &receiver_sections(&mesh, &receivers, &fitted.section_of)),
         image: proof.image,
         certificate: None,
         curve: proof.curve,
@@ -212,7 +213,7 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
         skipped: skipped(&scene, &mesh, &written.not_copied),
         max_error: request.max_error,
         command: request.command.clone(),
-        files: files.iter().map(|path| path.display().to_string()).collect(),
+        files: written.files().map(|path| path.display().to_string()).collect(),
     };
     write_report(&mut report, out_dir, &stem, proof.picture)?;
     Ok(report)
@@ -234,31 +235,39 @@ struct Proof {
     picture: Option<image::RgbaImage>,
 }
 
-/// Reads the asset back and measures it on pairs and frames that the search never saw.
-fn prove(
-    request: &FitRequest,
-    (scene, mesh): (&Scene, &Mesh),
-    fitted: &Fitted,
-    written: &Path,
-    search_s: f64,
-) -> Result<Proof, FitError> {
-    let planes = asset::read(written)?.in_unit_space(&mesh.frame);
-    let pairs = held_out(mesh, request, HELD_OUT, Purpose::HeldOut);
-    let held_out = measure(&planes, &pairs);
-    let curve = curve(fitted, &pairs, (planes.len(), &held_out), search_s);
-    let mut proof = Proof { held_out, lookups: lookups(&planes, &pairs), curve, image: None, picture: None };
+/// Reads the asset back, planes and labels, and measures it on pairs and frames that the search never saw.
+fn prove(request: &FitRequest, mesh: &Mesh, fitted: &Fitted, written: &Path, search_s: f64) -> Result<Proof, FitError> {
+    // The written scene has the same triangles as the input's, in the same order: the mesh holds for both.
+    let (set, scene) = (asset::read(written)?.in_unit_space(&mesh.frame), scene::load(written)?);
+    let (pairs, receivers) = held_out(mesh, request, HELD_OUT, Purpose::HeldOut);
+    let section_of = receiver_sections(mesh, &receivers, &scene.section_of);
+    let held_out = measure(&set, &pairs, &section_of);
+    let curve = curve(fitted, &pairs, (set.planes.len(), &held_out), search_s);
+    let mut proof =
+        Proof { held_out, lookups: Lookups::measure(&set, &pairs, &section_of), curve, image: None, picture: None };
     if let Some(options) = &request.validation {
         let lights = validation_lights(request, &held_out, options.lights);
-        let validation = validate((scene, mesh), &planes, &lights, options)?;
+        let validation = validate((&scene, mesh), &set, &lights, options)?;
         (proof.image, proof.picture) = (Some(validation.errors), Some(validation.comparison));
     }
     Ok(proof)
 }
 
+/// The section of each receiver, from that of each triangle of the scene.
+#[must_use]
+pub fn receiver_sections(mesh: &Mesh, receivers: &Receivers, section_of: &[u32]) -> Vec<u32> {
+    receivers.triangles.iter().map(|&triangle| section_of[mesh.source[triangle as usize] as usize]).collect()
+}
+
+/// The error of planes that every receiver reads.
+fn measure_one_section(planes: &[BakedPlane], pairs: &Pairs) -> Metrics {
+    measure(&BakedSet::one_section(planes.to_vec()), pairs, &vec![0; pairs.receivers])
+}
+
 /// Searches planes, or takes those of a file, and bakes them.
 fn fit(
     request: &FitRequest,
-    mesh: &Mesh,
+    (mesh, triangles): (&Mesh, usize),
     pairs: &Pairs,
     progress: &mut dyn FnMut(String),
     (clock, time_s): (&mut Clock, &mut Times),
@@ -277,18 +286,20 @@ fn fit(
         time_s.search = clock.lap();
         let planes = bake(pairs, &by_hand, &BakeOptions { turn: Turn::Fixed, ..options });
         time_s.bake = clock.lap();
-        return Ok(Fitted { planes, greedy: Vec::new(), found_at_s: Vec::new() });
+        let (set, section_of) = (BakedSet::one_section(planes), vec![0; triangles]);
+        return Ok(Fitted { set, section_of, greedy: Vec::new(), found_at_s: Vec::new() });
     }
     let selection = selection_options(request);
     let candidates = generate(mesh, &CandidateOptions { seed: request.seed, ..request.effort.candidates });
-    let judging = request.max_error.map(|target| (target, held_out(mesh, request, JUDGING, Purpose::Judging)));
+    let judging = request.max_error.map(|target| (target, held_out(mesh, request, JUDGING, Purpose::Judging).0));
     let (start, mut found_at_s) = (Instant::now(), Vec::new());
     let selected = select(mesh, pairs, &candidates, &selection, &mut |planes| {
         progress(format!("searching: {} planes", planes.len()));
         found_at_s.push(start.elapsed().as_secs_f64());
         match &judging {
             Some((target, judging))
-                if measure(&bake(pairs, planes, &options), judging).shadow_error <= target * TARGET_MARGIN =>
+                if measure_one_section(&bake(pairs, planes, &options), judging).shadow_error
+                    <= target * TARGET_MARGIN =>
             {
                 Verdict::Enough
             }
@@ -300,7 +311,8 @@ fn fit(
     let planes = bake(pairs, &selected.planes, &options);
     let greedy = bake(pairs, &selected.greedy, &BakeOptions { rounds: 1, ..options });
     time_s.bake = clock.lap();
-    Ok(Fitted { planes, greedy, found_at_s })
+    let (set, section_of) = (BakedSet::one_section(planes), vec![0; triangles]);
+    Ok(Fitted { set, section_of, greedy, found_at_s })
 }
 
 /// The preset's options with the user's numbers.
@@ -322,11 +334,16 @@ fn receiver_options(count: usize, exposure_rays: usize, request: &FitRequest, pu
     ReceiverOptions { count, exposure_rays, seed: seed_for(request, purpose) }
 }
 
-/// Pairs that the search does not see.
-fn held_out(mesh: &Mesh, request: &FitRequest, [receivers, lights]: [usize; 2], purpose: Purpose) -> Pairs {
+/// Pairs that the search does not see, and their receivers.
+fn held_out(
+    mesh: &Mesh,
+    request: &FitRequest,
+    [receivers, lights]: [usize; 2],
+    purpose: Purpose,
+) -> (Pairs, Receivers) {
     let receivers = sample(mesh, &receiver_options(receivers, EXPOSURE_RAYS[1], request, purpose));
     let lights = request.domain.directions(lights, seed_for(request, purpose));
-    trace(mesh, &receivers, &lights, request.domain.solid_angle())
+    (trace(mesh, &receivers, &lights, request.domain.solid_angle()), receivers)
 }
 
 /// The worst held-out light first, then others that neither search nor metrics used.
@@ -339,26 +356,13 @@ fn validation_lights(request: &FitRequest, held_out: &Metrics, count: usize) -> 
 
 /// Held-out error after each greedy plane; the last point is the result.
 fn curve(fitted: &Fitted, pairs: &Pairs, (planes, result): (usize, &Metrics), seconds: f64) -> Vec<CurvePoint> {
-    let none = CurvePoint::new(0, &measure(&[], pairs), 0.0);
+    let none = CurvePoint::new(0, &measure_one_section(&[], pairs), 0.0);
     let greedy = (1..planes.min(fitted.greedy.len() + 1)).map(|k| {
         let seconds = fitted.found_at_s.get(k - 1).copied().unwrap_or(seconds);
-        CurvePoint::new(k, &measure(&fitted.greedy[..k], pairs), seconds)
+        CurvePoint::new(k, &measure_one_section(&fitted.greedy[..k], pairs), seconds)
     });
     let result = (planes > 0).then(|| CurvePoint::new(planes, result, seconds));
     std::iter::once(none).chain(greedy).chain(result).collect()
-}
-
-/// Planes that can cast, per light: mean weighted like the error, and the maximum.
-fn lookups(planes: &[BakedPlane], pairs: &Pairs) -> Lookups {
-    let (mut sum, mut weight, mut max) = (0.0, 0.0, 0);
-    for light in &pairs.lights {
-        let active = planes.iter().filter(|b| plane_rows(&b.plane, b.side, light.light).is_some()).count();
-        let light_weight: f64 = light.vote.iter().map(|v| f64::from(v.abs())).sum();
-        sum += active as f64 * light_weight;
-        weight += light_weight;
-        max = max.max(active);
-    }
-    Lookups { mean: if weight > 0.0 { sum / weight } else { 0.0 }, max }
 }
 
 /// Box of the receivers in model space; of the model where nothing is seen.

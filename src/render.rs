@@ -1,6 +1,7 @@
 //! Frames of a model with its self-shadows: one forward pass, no shadow map.
 //!
-//! In: a [`Scene`](crate::scene::Scene), baked planes in unit space, a [`Camera`] and a [`Light`]. Out: an RGBA
+//! In: a [`Scene`](crate::scene::Scene) whose triangles know their sections, a set of baked planes in unit space, a
+//! [`Camera`] and a [`Light`]. Out: an RGBA
 //! picture. Two renderers draw the same frame: [`turntable`] with wgpu and [`cpu`] with traced camera rays, for
 //! machines without an adapter. Their shading constants are the ones below; `tests/parity.rs` compares them.
 //!
@@ -81,6 +82,12 @@ impl Light {
             Self::Directional { to_light } => to_light,
             Self::Point { position_unit } => position_unit - p_unit,
         }
+    }
+
+    /// The direction that picks the active lists: towards the light from the model's middle, the centre of unit space.
+    #[must_use]
+    pub fn from_centre(&self) -> Vec3 {
+        self.towards(Vec3::ZERO).normalize_or_zero()
     }
 }
 

@@ -1,8 +1,14 @@
 //! The report: one stable JSON object a fit, and the short table for people.
 
 use crate::{scene::Skipped, validation::ImageErrors};
+use rayon::prelude::*;
 use serde::Serialize;
-use shadowfit_solver::metrics::Metrics;
+use shadowfit_solver::{
+    metrics::Metrics,
+    plane::BakedSet,
+    shade::set_rows,
+    visibility::{LightPairs, Pairs},
+};
 use std::fmt;
 
 /// Version of the JSON layout; a change that breaks readers raises the number.
@@ -55,13 +61,34 @@ pub struct Report {
     pub files: Vec<String>,
 }
 
-/// Textures read per fragment: the length of the list of planes that can cast.
+/// Textures read per fragment before early out: the planes that can cast in the list of its section.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Lookups {
-    /// Mean over the light domain.
+    /// Mean over the surface and the light domain, weighted like the error.
     pub mean: f64,
-    /// Most under any light.
+    /// Most anywhere under any light.
     pub max: usize,
+}
+
+impl Lookups {
+    /// Counts what the pairs read; `section_of` has one entry a receiver.
+    #[must_use]
+    pub fn measure(set: &BakedSet, pairs: &Pairs, section_of: &[u32]) -> Self {
+        let of_light = |light: &LightPairs| {
+            let rows = set_rows(set, light.light);
+            let casting = |list: &Vec<u32>| list.iter().filter(|&&plane| rows[plane as usize].is_some()).count();
+            let read: Vec<usize> = set.lists(light.light).iter().map(casting).collect();
+            let (mut sum, mut weight, mut max) = (0.0, 0.0, 0);
+            for (&receiver, vote) in light.receiver.iter().zip(&light.vote) {
+                let (count, vote) = (read[section_of[receiver as usize] as usize], f64::from(vote.abs()));
+                (sum, weight, max) = (sum + count as f64 * vote, weight + vote, max.max(count));
+            }
+            (sum, weight, max)
+        };
+        let lights: Vec<_> = pairs.lights.par_iter().map(of_light).collect();
+        let (sum, weight, max) = lights.iter().fold((0.0, 0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1, a.2.max(b.2)));
+        Self { mean: if weight > 0.0 { sum / weight } else { 0.0 }, max }
+    }
 }
 
 /// Error for a number of planes.

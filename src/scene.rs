@@ -26,6 +26,8 @@ mod extensions;
 mod materials;
 mod nodes;
 mod primitive;
+pub(crate) mod raw;
+mod sections;
 
 pub use assembly::{MAX_DRAWS, MAX_TRIANGLES};
 pub use materials::{MAX_IMAGE_TEXELS, MAX_TEXELS};
@@ -66,7 +68,19 @@ pub struct Skipped {
     pub why: String,
 }
 
-/// A glTF file as triangles. `normals`, `uvs`, `material_of` and the vectors of `soup` have one entry a triangle.
+/// Where a triangle of a scene comes from. Copies of a mesh have the same origin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Origin {
+    /// Index into the file's `meshes`.
+    pub mesh: u32,
+    /// Index into the mesh's `primitives`.
+    pub primitive: u32,
+    /// Counts the triangles of the primitive, strips and fans taken apart.
+    pub triangle: u32,
+}
+
+/// A glTF file as triangles. All vectors but `materials`, `images` and `skipped` have one entry a triangle, and so
+/// have those of `soup`.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// Triangles in model space.
@@ -77,6 +91,11 @@ pub struct Scene {
     pub uvs: Vec<[Vec2; 3]>,
     /// Index into `materials`.
     pub material_of: Vec<u32>,
+    /// The triangle of the file.
+    pub origins: Vec<Origin>,
+    /// The section of a fitted asset, by the file's labels; 0 for a file without shadow planes. A triangle without a
+    /// label in a file of several sections has the number of sections here, which is no section: it reads no planes.
+    pub section_of: Vec<u32>,
     /// Materials; index 0 is always there: glTF's default material. Material `i` of the file is `i + 1`.
     pub materials: Vec<Material>,
     /// Decoded base colour images, sRGB.
@@ -169,10 +188,7 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Scene, Fault> {
 /// A record of the wrong shape, a hierarchy that is not a forest, or a transform that is not finite and affine.
 pub(crate) fn node_transforms(file: &GltfFile<'_>) -> Result<Vec<DAffine3>, Invalid> {
     let hierarchy = document::Document::parse(file.root()).and_then(|document| nodes::Hierarchy::new(&document));
-    hierarchy.map(|hierarchy| hierarchy.model_from_node).map_err(|fault| match fault {
-        Fault::Invalid { pointer, reason } => Invalid { pointer, reason },
-        Fault::Unsupported { .. } => Invalid { pointer: String::new(), reason: fault.to_string() },
-    })
+    hierarchy.map(|hierarchy| hierarchy.model_from_node).map_err(Invalid::from)
 }
 
 /// An error that does not know its file yet.
@@ -203,6 +219,15 @@ impl Fault {
         match self {
             Self::Invalid { pointer, reason } => SceneError::Invalid { path, pointer, reason },
             Self::Unsupported { features, remedy } => SceneError::Unsupported { path, features, remedy },
+        }
+    }
+}
+
+impl From<Fault> for Invalid {
+    fn from(fault: Fault) -> Self {
+        match fault {
+            Fault::Invalid { pointer, reason } => Self { pointer, reason },
+            Fault::Unsupported { .. } => Self { pointer: String::new(), reason: fault.to_string() },
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Validation: the asset as written, rendered and compared with traced masks, pixel by pixel.
 //!
-//! In: the scene, the planes *read back from the files*, views and lights. Per view the camera rays are traced once;
+//! In: the scene with its sections and the planes, both *read back from the files*, views and lights. Per view the camera rays are traced once;
 //! per light a traced mask and a rendered one (wgpu on the best adapter; the CPU twin where there is none) are
 //! compared on the pixels that both cover. Out: errors, and a picture of the worst light's worst view:
 //! reference | planes | difference.
@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use shadowfit_solver::{
     mesh::{Mesh, ray_origin},
-    plane::BakedPlane,
+    plane::BakedSet,
 };
 
 /// How much is rendered.
@@ -93,17 +93,17 @@ enum Renderer<'a> {
 
 impl<'a> Renderer<'a> {
     /// wgpu where it can draw this scene, else the CPU twin.
-    fn new(scene: &'a Scene, mesh: &'a Mesh, planes: &[BakedPlane]) -> Result<Self, RenderError> {
+    fn new(scene: &'a Scene, mesh: &'a Mesh, set: &BakedSet) -> Result<Self, RenderError> {
         let on_gpu = || {
             let gpu = Gpu::new()?;
             let mut turntable = turntable::Turntable::new(&gpu, scene, &mesh.frame)?;
-            turntable.set_planes(planes)?;
+            turntable.set_planes(set)?;
             Ok(Self::Gpu(Box::new(turntable), format!("wgpu:{}", gpu.adapter_name())))
         };
         match on_gpu() {
             Err(RenderError::NoAdapter | RenderError::Device { .. } | RenderError::TooLarge { .. }) => {
                 let mut turntable = cpu::Turntable::new(scene, mesh);
-                turntable.set_planes(planes);
+                turntable.set_planes(set);
                 Ok(Self::Cpu(turntable))
             }
             outcome => outcome,
@@ -150,11 +150,11 @@ impl PixelErrors {
 /// The driver fails while drawing.
 pub fn validate(
     (scene, mesh): (&Scene, &Mesh),
-    planes: &[BakedPlane],
+    set: &BakedSet,
     lights: &[Vec3],
     options: &ValidationOptions,
 ) -> Result<Validation, RenderError> {
-    let mut renderer = Renderer::new(scene, mesh, planes)?;
+    let mut renderer = Renderer::new(scene, mesh, set)?;
     let size_px = [options.size_px; 2];
     let (mut total, mut flips, mut worst) = (PixelErrors::default(), Vec::new(), None);
     let lights = &lights[..options.lights.min(lights.len())];

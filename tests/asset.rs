@@ -18,13 +18,14 @@ use glam::{DVec3, Vec3};
 use shadowfit::asset::{AssetRequest, Bounds, ShadowSet, read, write};
 use shadowfit_solver::{
     mesh::Frame,
-    plane::{BakedPlane, Side},
+    plane::{BakedPlane, BakedSet, Side},
+    shade::{set_rows, visibility},
 };
 
 fn assert_same(planes: &[BakedPlane], set: &ShadowSet, frame: &Frame) {
     let back = set.in_unit_space(frame);
-    assert_eq!(back.len(), planes.len());
-    for (i, (a, b)) in planes.iter().zip(&back).enumerate() {
+    assert_eq!(back.planes.len(), planes.len());
+    for (i, (a, b)) in planes.iter().zip(&back.planes).enumerate() {
         assert_eq!(a.texture, b.texture, "plane {i}");
         assert_eq!(a.side, b.side, "plane {i}");
         // f64 in the file: what remains is one rounding to f32.
@@ -34,7 +35,7 @@ fn assert_same(planes: &[BakedPlane], set: &ShadowSet, frame: &Frame) {
         }
         assert!((a.bias - b.bias).abs() <= f32::EPSILON * a.bias, "plane {i}");
     }
-    assert_eq!(set.sections, [(0..planes.len()).collect::<Vec<_>>()]);
+    assert_eq!((&back.sections, &back.active), (&vec![(0..planes.len() as u32).collect()], &None));
 }
 
 #[test]
@@ -49,7 +50,7 @@ fn written_planes_read_back_from_the_model_and_from_the_sidecar() {
             assert_same(&planes, &set, &FRAME);
             assert_eq!(set.bounds, BOUNDS);
         }
-        let texels: usize = planes.iter().map(|p| p.texture.coverage.len()).sum();
+        let texels: usize = planes.iter().map(|p| p.texture.texels.len()).sum();
         assert!(written.texture_bytes >= texels as u64);
         assert_eq!(written.planes, count);
         assert!(written.to_string().contains(&format!("planes: {count}")));
@@ -65,7 +66,10 @@ fn a_model_without_shadow_gets_an_empty_set() {
     assert!(written.to_string().contains("no self-shadow"), "{written}");
     assert_eq!((written.texture_bytes, written.png_bytes()), (0, 0));
     for path in [&written.model, &written.sidecar] {
-        assert_eq!(read(path).unwrap(), ShadowSet { bounds: BOUNDS, planes: vec![], sections: vec![vec![]] });
+        assert_eq!(
+            read(path).unwrap(),
+            ShadowSet { bounds: BOUNDS, planes: vec![], sections: vec![vec![]], active: None }
+        );
     }
     let (json, bin) = fixtures::open(&written.model);
     assert_eq!(bin, Some(triangle()));
@@ -78,13 +82,13 @@ fn planes_stay_exact_far_from_the_origin_and_at_any_scale() {
         let frame = Frame { centre_model: DVec3::new(centre, centre / 3.0, -centre), radius };
         let folders = Folders::new();
         let input = folders.input("m.glb", &glb(&document("", ""), Some(&triangle())));
-        let planes = planes(5);
+        let set = BakedSet::one_section(planes(5));
         let bounds = Bounds { min: frame.centre_model - radius, max: frame.centre_model + radius };
         let out_dir = &folders.out();
-        let request = AssetRequest { input: &input, out_dir, stem: "m", frame: &frame, bounds, planes: &planes };
-        let set = read(&write(&request).unwrap().sidecar).unwrap();
-        assert_same(&planes, &set, &frame);
-        assert_eq!(set.bounds, bounds);
+        let request = AssetRequest { frame: &frame, bounds, ..fixtures::request(&input, out_dir, &set) };
+        let back = read(&write(&request).unwrap().sidecar).unwrap();
+        assert_same(&set.planes, &back, &frame);
+        assert_eq!(back.bounds, bounds);
     }
 }
 
@@ -127,6 +131,31 @@ fn a_moved_frame_node_moves_its_planes() {
     assert_eq!(after.bounds, Bounds { min: DVec3::new(-2.0, 0.0, 7.0), max: DVec3::new(2.0, 4.0, 10.0 + 2e-7) });
 }
 
+/// A direction towards the light turns with the model like any vector, also under a scale that differs by axis.
+#[test]
+fn a_moved_frame_node_turns_the_directions() {
+    let folders = Folders::new();
+    let input = folders.input("m.glb", &glb(&document("", ""), Some(&triangle())));
+    let (set, out) = (fixtures::active_set(planes(3)), folders.out());
+    let written = write(&fixtures::request(&input, &out, &set)).unwrap();
+    let before = set.active.unwrap();
+    assert_eq!(read(&written.model).unwrap().active.as_ref(), Some(&before), "not to the last bit");
+    assert_eq!(read(&written.sidecar).unwrap().active.as_ref(), Some(&before), "not to the last bit");
+    let (json, bin) = fixtures::open(&written.model);
+    // A quarter turn around y after a scale: (x, y, z) becomes (z, 3 y, -2 x).
+    let turned = json.replace(
+        "\"name\":\"shadow planes\"",
+        "\"rotation\":[0,0.7071067811865476,0,0.7071067811865476],\"scale\":[2,3,1],\"name\":\"shadow planes\"",
+    );
+    let path = folders.input("turned.glb", &glb(&turned, bin.as_deref()));
+    let after = read(&path).unwrap().active.unwrap();
+    assert_eq!(after.lists, before.lists);
+    for (a, b) in before.directions.iter().zip(&after.directions) {
+        let expected = Vec3::new(a.z, 3.0 * a.y, -2.0 * a.x).normalize();
+        assert!(b.distance(expected) < 1e-6 && (b.length() - 1.0).abs() < 1e-6, "{a} became {b}, not {expected}");
+    }
+}
+
 #[test]
 fn unit_space_planes_cast_the_same_shadow() {
     let folders = Folders::new();
@@ -134,10 +163,8 @@ fn unit_space_planes_cast_the_same_shadow() {
     let planes = planes(6);
     let back = read(&folders.write(&input, &planes).unwrap().model).unwrap().in_unit_space(&FRAME);
     let l = Vec3::new(0.3, 0.8, 0.5).normalize();
-    let shadow = |planes: &[BakedPlane], p: Vec3| {
-        let rows: Vec<_> = planes.iter().map(|b| shadowfit_solver::shade::plane_rows(&b.plane, b.side, l)).collect();
-        shadowfit_solver::shade::visibility(planes, &rows, p)
-    };
+    let shadow = |set: &BakedSet, p: Vec3| visibility(&set.planes, &set_rows(set, l), &set.lists(l)[0], p);
+    let planes = BakedSet::one_section(planes);
     let mut numbers = fixtures::Numbers(1);
     for _ in 0..200 {
         let p = Vec3::new(numbers.signed(), numbers.signed(), numbers.signed());

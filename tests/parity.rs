@@ -11,7 +11,7 @@ use shadowfit::{
 };
 use shadowfit_solver::{
     mesh::{Mesh, Sides},
-    plane::{BakedPlane, OccluderTexture, ShadowPlane, Side},
+    plane::{ActiveLists, BakedPlane, BakedSet, Encoding, OccluderTexture, ShadowPlane, Side},
     shade::EDGE_ON,
 };
 use std::sync::LazyLock;
@@ -25,12 +25,17 @@ struct Twins<'a> {
 }
 
 impl<'a> Twins<'a> {
+    /// All planes in one section.
     fn new(scene: &'a Scene, mesh: &'a Mesh, planes: &[BakedPlane]) -> Self {
+        Self::with(scene, mesh, &BakedSet::one_section(planes.to_vec()))
+    }
+
+    fn with(scene: &'a Scene, mesh: &'a Mesh, set: &BakedSet) -> Self {
         static GPU: LazyLock<Gpu> = LazyLock::new(|| Gpu::new().expect("these tests need a graphics adapter"));
         let mut gpu = turntable::Turntable::new(&GPU, scene, &mesh.frame).expect("the scene fits");
-        gpu.set_planes(planes).expect("the planes fit");
+        gpu.set_planes(set).expect("the planes fit");
         let mut cpu = cpu::Turntable::new(scene, mesh);
-        cpu.set_planes(planes);
+        cpu.set_planes(set);
         Self { gpu, cpu }
     }
 
@@ -137,6 +142,99 @@ fn masks_agree_under_all_lights() {
     assert!(shadowed > 100_000, "the planes cast too little to test anything: {shadowed}");
 }
 
+/// Seven sections in stripes and one triangle in eight in none; every other plane as a distance field; four directions
+/// that pick the lists.
+fn sectioned(scene: &mut Scene) -> BakedSet {
+    let count = scene.section_of.len();
+    scene.section_of = (0..count as u32).map(|triangle| triangle / 16 % 8).collect();
+    let mut planes = procedural::planes();
+    for baked in planes.iter_mut().step_by(2) {
+        // A step of the coverage's bytes is the field's border; below it the field is open, as at the ring.
+        baked.texture.encoding = Encoding::Sdf;
+    }
+    let list =
+        |section: u32, step: u32| (0..7).filter(|plane| (plane + section).is_multiple_of(step)).collect::<Vec<u32>>();
+    let sections: Vec<Vec<u32>> = (0..7).map(|section| list(section, 1)).collect();
+    let directions = vec![Vec3::Y, Vec3::X, Vec3::NEG_X, Vec3::Z];
+    let of = |direction: u32| (0..7).map(|section| list(section, 2 + direction)).collect();
+    BakedSet { planes, sections, active: Some(ActiveLists { directions, lists: (0..4).map(of).collect() }) }
+}
+
+/// Each section has its shadows, and those of the list that the light picks. A distance field has no grey, so the twins
+/// may differ by all of the light where its border runs through a pixel's centre; that is as rare as at other edges.
+#[test]
+fn sections_agree_under_all_lights() {
+    let mut scene = procedural::scene();
+    let set = sectioned(&mut scene);
+    let mesh = mesh_of(&scene);
+    let all = BakedSet { active: None, ..set.clone() };
+    let mut twins = Twins::with(&scene, &mesh, &set);
+    let mut without_lists = Twins::with(&scene, &mesh, &all);
+    let (mut shadow, mut frames, mut changed) = (0.0, 0, 0);
+    for camera in views() {
+        for light in lights(&set.planes) {
+            let request = request(camera, light, Mode::Mask);
+            let pair = twins.render(&request);
+            let difference = compare(&pair);
+            assert!(difference.shadow <= 0.003, "{light:?}: {difference:?}");
+            (shadow, frames) = (shadow + difference.shadow, frames + 1);
+            let whole = without_lists.gpu.render(&request).expect("drawn");
+            changed += pair[0].pixels().zip(whole.pixels()).filter(|(p, q)| p != q).count();
+        }
+    }
+    println!("shadow {:.6}, {changed} pixels changed by the lists", shadow / f64::from(frames));
+    assert!(shadow / f64::from(frames) <= 0.001, "{shadow} over {frames} frames");
+    assert!(changed > 10_000, "the lists change too little to test anything: {changed}");
+}
+
+/// Shadow where the section has the plane, none where it has another or the triangle has no section.
+#[test]
+fn a_triangle_reads_the_list_of_its_section() {
+    let lists = |a: u32, b: u32| vec![vec![a], vec![b], vec![]];
+    let planes = vec![plate(0.3, 2.0, Side::Both), plate(-0.3, 2.0, Side::Both)];
+    let directions = vec![Vec3::Y, Vec3::NEG_Y, Vec3::X];
+    let active = ActiveLists { directions, lists: vec![lists(0, 1), lists(1, 0), lists(1, 1)] };
+    let sections = vec![vec![0, 1], vec![1, 0], vec![]];
+    let set = BakedSet { planes, sections, active: Some(active) };
+    let high = Light::Point { position_unit: Vec3::new(0.1, 0.9, 0.0) };
+    for (section, light, is_lit) in [
+        (0, directional(0.1, 1.0, 0.0), false),
+        (1, directional(0.1, 1.0, 0.0), true),
+        (2, directional(0.1, 1.0, 0.0), true),
+        (3, directional(0.1, 1.0, 0.0), true),
+        (u32::MAX, directional(0.1, 1.0, 0.0), true),
+        (0, directional(0.9, 0.4, 0.0), true),
+        (0, high, false),
+        (1, high, true),
+        (3, high, true),
+    ] {
+        let mut scene = procedural::ground(Sides::Front);
+        scene.section_of.fill(section);
+        let mesh = mesh_of(&scene);
+        let camera = Camera::orthographic(0.0, std::f32::consts::FRAC_PI_2);
+        for frame in Twins::with(&scene, &mesh, &set).render(&request(camera, light, Mode::Mask)) {
+            let lit = frame.get_pixel(SIZE_PX[0] / 2, SIZE_PX[1] / 2).0[0];
+            assert_eq!(lit >= 128, is_lit, "section {section} under {light:?}: {lit}");
+        }
+    }
+}
+
+/// As many planes and sections as a large model has; each section its own.
+#[test]
+fn thousands_of_planes_and_sections_are_drawn() {
+    let (planes, sections) = (16_384, 4_096);
+    let mut scene = procedural::scene();
+    let count = scene.section_of.len() as u32;
+    scene.section_of = (0..count).map(|triangle| triangle * 7 % sections).collect();
+    let mesh = mesh_of(&scene);
+    let some = procedural::planes();
+    let planes: Vec<BakedPlane> = (0..planes).map(|i| some[i % some.len()].clone()).collect();
+    let sections = (0..sections).map(|section| (4 * section..4 * section + 4).collect()).collect();
+    let mut twins = Twins::with(&scene, &mesh, &BakedSet { planes, sections, active: None });
+    let difference = compare(&twins.render(&request(views()[0], directional(0.4, 0.8, 0.5), Mode::Mask)));
+    assert!(difference.shadow <= 0.003 && difference.covered > 5_000, "{difference:?}");
+}
+
 /// Colours differ by rounding (sRGB encoding, texture filter) but at silhouettes, where a pixel may show another
 /// surface: few, so the mean stays below one step.
 #[test]
@@ -184,16 +282,23 @@ fn planes_are_drawn_through_the_model() {
     let without = twins.gpu.render(&wanted).expect("drawn");
     let changed = with.pixels().zip(without.pixels()).filter(|(p, q)| p != q).count();
     assert!(changed > with.pixels().len() / 10, "only {changed} pixels show planes");
+    // Hundreds of them.
+    let many = (0..50).flat_map(|_| planes.clone()).collect();
+    let mut twins = Twins::with(&scene, &mesh, &BakedSet::one_section(many));
+    wanted.options.mode = Mode::Planes;
+    let crowded = twins.gpu.render(&wanted).expect("drawn");
+    assert!(crowded.pixels().zip(with.pixels()).any(|(p, q)| p != q));
 }
 
 /// A horizontal square of half-width `half` around the y axis at height `y` (unit space) that blocks everywhere but
 /// on a border of one texel in ten. Its normal u x v points down, so receivers below are in front of it.
 fn plate(y: f32, half: f32, side: Side) -> BakedPlane {
     let inside = |i: usize| (1..9).contains(&i);
-    let coverage = (0..100).map(|i| if inside(i % 10) && inside(i / 10) { 255 } else { 0 }).collect();
+    let texels = (0..100).map(|i| if inside(i % 10) && inside(i / 10) { 255 } else { 0 }).collect();
     let origin = Vec3::new(-half, y, -half);
     let plane = ShadowPlane { origin, u: Vec3::X * 2.0 * half, v: Vec3::Z * 2.0 * half };
-    BakedPlane { plane, texture: OccluderTexture { width: 10, height: 10, coverage }, side, bias: 1e-4 }
+    let texture = OccluderTexture { width: 10, height: 10, encoding: Encoding::Coverage, texels };
+    BakedPlane { plane, texture, side, bias: 1e-4 }
 }
 
 /// Is `q`, a point of the plate, in its blocking part? The filter crosses one half at the edge of a texel; but for

@@ -3,12 +3,13 @@
 mod scenes;
 
 use glam::{DVec3, Vec3};
-use scenes::{PLATE_SCENE, Sampling, closed, cuboid, fit, fit_options, pairs, planted, planted_plates, sphere};
+use scenes::{
+    PLATE_SCENE, Sampling, closed, cuboid, fit, fit_options, measured, pairs, planted, planted_plates, sphere,
+};
 use shadowfit_solver::{
     bake::bake,
     lights::{LightDomain, direction},
     mesh::Mesh,
-    metrics::measure,
     plane::{ShadowPlane, Side},
     receivers::Receivers,
     selection::Selection,
@@ -36,7 +37,13 @@ fn ground_receivers(mesh: &Mesh, count: usize) -> Receivers {
     let pick = |of: &[Vec3]| kept.iter().map(|&i| of[i]).collect::<Vec<_>>();
     let side = 2.0 * PLATE_SCENE[0] / mesh.frame.radius;
     let weights = vec![(side * side / kept.len() as f64) as f32; kept.len()];
-    Receivers { points: pick(&all.points), origins: pick(&all.origins), normals: pick(&all.normals), weights }
+    Receivers {
+        points: pick(&all.points),
+        origins: pick(&all.origins),
+        normals: pick(&all.normals),
+        weights,
+        triangles: kept.iter().map(|&i| all.triangles[i]).collect(),
+    }
 }
 
 #[test]
@@ -78,7 +85,7 @@ fn the_true_plane_of_the_plate_explains_its_shadow() {
     let given = Mask::open(true_plane(&mesh), Side::Both, BIAS, 64, 64);
     let baked = bake(&training, &[given], &fit_options(1, 1).bake);
     assert_eq!(baked.len(), 1);
-    let metrics = measure(&baked, &held_out);
+    let metrics = measured(&baked, &held_out);
     // What the method promises for a plate: the outline, half a texel of 128 on either side, is all that is wrong.
     assert!(metrics.shadow_error <= 0.02, "{metrics:?}");
     let area = baked[0].plane.u.cross(baked[0].plane.v).length();
@@ -91,7 +98,7 @@ fn the_search_finds_the_plate() {
     let mesh = Mesh::new(&scenes::plate_over_ground()).unwrap();
     let (training, held_out) = (pairs(&mesh, &TRAINING), pairs(&mesh, &HELD_OUT));
     let (selection, baked) = fit(&mesh, &training, &fit_options(6, 1));
-    let metrics = measure(&baked, &held_out);
+    let metrics = measured(&baked, &held_out);
     assert_eq!((selection.planes.len(), baked.len()), (1, 1), "{metrics:?}");
     assert!(metrics.shadow_error <= 0.02, "{metrics:?}");
     assert!(baked[0].plane.normal().y.abs() > 0.999, "{:?}", baked[0].plane);
@@ -107,7 +114,7 @@ fn convex_bodies_get_no_planes() {
         let (selection, baked) = fit(&mesh, &training, &fit_options(8, 1));
         let Selection { planes, greedy, .. } = selection;
         assert_eq!((planes.len(), greedy.len(), baked.len()), (0, 0, 0), "{name}");
-        let metrics = measure(&baked, &training);
+        let metrics = measured(&baked, &training);
         assert_eq!((metrics.shadow_error, metrics.light_error, metrics.worst_light.max), (0.0, 0.0, 0.0), "{name}");
     }
 }
@@ -117,7 +124,7 @@ fn planted_plates_are_found() {
     let mesh = Mesh::new(&planted()).unwrap();
     let (training, held_out) = (pairs(&mesh, &TRAINING), pairs(&mesh, &HELD_OUT));
     let (selection, baked) = fit(&mesh, &training, &fit_options(8, 1));
-    let metrics = measure(&baked, &held_out);
+    let metrics = measured(&baked, &held_out);
     assert_eq!((selection.planes.len(), baked.len()), (4, 4), "{metrics:?}");
     assert!(metrics.shadow_error <= 0.03, "{metrics:?}");
     for plate in planted_plates() {

@@ -3,13 +3,13 @@
 mod scenes;
 
 use glam::{DQuat, DVec3, Vec3};
-use scenes::{FitOptions, Sampling, fit, fit_options, knot, mapped, pairs, soup};
+use scenes::{FitOptions, Sampling, fit, fit_options, knot, mapped, measured, pairs, soup};
 use shadowfit_solver::{
     bake::{BakeOptions, bake},
     lights::LightDomain,
     mesh::{Mesh, Sides, Soup},
-    metrics::{Metrics, measure},
-    plane::{BakedPlane, OccluderTexture, ShadowPlane, Side},
+    metrics::Metrics,
+    plane::{BakedPlane, Encoding, OccluderTexture, ShadowPlane, Side},
     receivers::{ReceiverOptions, Receivers, sample},
     rectangle::around_section,
     sampling::uniform,
@@ -36,7 +36,7 @@ fn options(seed: u64) -> FitOptions {
 fn fitted(soup: &Soup, seed: u64) -> (Vec<BakedPlane>, Metrics) {
     let mesh = Mesh::new(soup).expect("the scene has triangles");
     let (_, baked) = fit(&mesh, &pairs(&mesh, &Sampling { seed, ..TRAINING }), &options(seed));
-    let metrics = measure(&baked, &pairs(&mesh, &HELD_OUT));
+    let metrics = measured(&baked, &pairs(&mesh, &HELD_OUT));
     (baked, metrics)
 }
 
@@ -56,11 +56,11 @@ fn nearest_texel_error(pairs: &Pairs, masks: &[Mask]) -> f64 {
 
 /// A baked plane as the votes see it. Nothing is lost: the bake's coverage is binary.
 fn mask_of(baked: &BakedPlane) -> Mask {
-    let OccluderTexture { width, height, coverage } = &baked.texture;
+    let OccluderTexture { width, height, texels, .. } = &baked.texture;
     let mut mask = Mask::open(baked.plane, baked.side, baked.bias, *width, *height);
-    for (blocked, coverage) in mask.blocked.iter_mut().zip(coverage) {
-        assert!(matches!(coverage, 0 | 255), "coverage {coverage}");
-        *blocked = coverage / 255;
+    for (blocked, texel) in mask.blocked.iter_mut().zip(texels) {
+        assert!(matches!(texel, 0 | 255), "coverage {texel}");
+        *blocked = texel / 255;
     }
     mask
 }
@@ -103,6 +103,7 @@ fn doubled(receivers: &Receivers) -> Receivers {
         origins: twice(&receivers.origins),
         normals: twice(&receivers.normals),
         weights: receivers.weights.iter().flat_map(|w| [*w, *w]).collect(),
+        triangles: receivers.triangles.iter().flat_map(|t| [*t, *t]).collect(),
     }
 }
 
@@ -217,7 +218,7 @@ fn bytes(planes: &[BakedPlane]) -> Vec<u8> {
         out.extend(bias.to_bits().to_le_bytes());
         out.push(*side as u8);
         out.extend([texture.width, texture.height].iter().flat_map(|n| n.to_le_bytes()));
-        out.extend(&texture.coverage);
+        out.extend(&texture.texels);
     }
     out
 }
@@ -226,7 +227,7 @@ fn bytes(planes: &[BakedPlane]) -> Vec<u8> {
 fn lids(coverage: u8) -> Vec<BakedPlane> {
     let lid = |y: f32| BakedPlane {
         plane: ShadowPlane { origin: Vec3::new(-500.0, y, -500.0), u: Vec3::Z * 1e3, v: Vec3::X * 1e3 },
-        texture: OccluderTexture { width: 3, height: 3, coverage: vec![coverage; 9] },
+        texture: OccluderTexture { width: 3, height: 3, encoding: Encoding::Coverage, texels: vec![coverage; 9] },
         side: Side::Both,
         bias: BIAS,
     };
@@ -239,16 +240,16 @@ fn metrics_add_up() {
     let pairs = pairs(&mesh, &HELD_OUT);
     let lit_per_shadow = (pairs.total_weight - pairs.shadow_weight) / pairs.shadow_weight;
     let close = |a: f64, b: f64| (a - b).abs() < 1e-5 * (1.0 + b.abs());
-    let none = measure(&[], &pairs);
+    let none = measured(&[], &pairs);
     assert!(close(none.shadow_error, 1.0) && close(none.missed, 1.0) && none.false_ == 0.0, "{none:?}");
     assert!(close(none.light_error, pairs.shadow_weight / pairs.total_weight), "{none:?}");
     assert!(none.worst_light.max >= none.worst_light.p95 && none.worst_light.max >= 1.0, "{none:?}");
     assert_eq!((none.receivers, none.lights), (pairs.receivers, HELD_OUT.lights));
     // Nothing is missed where everything is dark, and half as much is with half coverage.
-    let all = measure(&lids(255), &pairs);
+    let all = measured(&lids(255), &pairs);
     assert!(all.missed < 0.01, "{all:?}");
     assert!((all.false_ / lit_per_shadow - 1.0).abs() < 0.01, "{all:?} of {lit_per_shadow}");
-    let half = measure(&lids(51), &pairs);
+    let half = measured(&lids(51), &pairs);
     assert!((half.missed - 0.8).abs() < 0.01 && (half.false_ / lit_per_shadow - 0.2).abs() < 0.01, "{half:?}");
     for metrics in [none, all, half] {
         assert!(close(metrics.shadow_error, metrics.missed + metrics.false_), "{metrics:?}");
@@ -261,7 +262,7 @@ fn metrics_add_up() {
         let light = pairs.lights[l].clone();
         let shadow_weight = light.vote.iter().map(|v| f64::from(v.max(0.0))).sum();
         let alone = Pairs { lights: vec![light], shadow_weight, ..pairs };
-        measure(&[], &alone).shadow_error * shadow_weight / mean
+        measured(&[], &alone).shadow_error * shadow_weight / mean
     };
     let mut by_light: Vec<f64> = (0..pairs.lights.len()).map(one).collect();
     by_light.sort_by(f64::total_cmp);
@@ -274,7 +275,7 @@ fn without_shadow_all_errors_are_zero() {
     let mesh = scenes::closed(&scenes::sphere(2));
     let pairs = pairs(&mesh, &HELD_OUT);
     for planes in [vec![], lids(255)] {
-        let metrics = measure(&planes, &pairs);
+        let metrics = measured(&planes, &pairs);
         let expected = Metrics { receivers: pairs.receivers, lights: HELD_OUT.lights, ..Metrics::default() };
         assert_eq!(metrics, expected);
     }

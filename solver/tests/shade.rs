@@ -5,7 +5,7 @@ mod scenes;
 use glam::{DVec3, Vec3};
 use scenes::unit_vector;
 use shadowfit_solver::{
-    plane::{BakedPlane, OccluderTexture, ShadowPlane, Side},
+    plane::{ActiveLists, BakedPlane, BakedSet, Encoding, OccluderTexture, SDF_BORDER, ShadowPlane, Side},
     sampling::uniform,
     shade::{EDGE_ON, crossing, crossing_point_light, plane_rows, sample, visibility, visibility_point_light},
 };
@@ -36,7 +36,7 @@ fn exact(plane: &ShadowPlane, l: Vec3, p: Vec3) -> (f64, f64, f64) {
 }
 
 fn full_texture(plane: ShadowPlane, side: Side) -> BakedPlane {
-    let texture = OccluderTexture { width: 3, height: 3, coverage: vec![255; 9] };
+    let texture = OccluderTexture { width: 3, height: 3, encoding: Encoding::Coverage, texels: vec![255; 9] };
     BakedPlane { plane, texture, side, bias: 1e-3 }
 }
 
@@ -95,15 +95,15 @@ fn edge_on_and_broken_planes_cast_nothing() {
     for (k, plane) in broken.into_iter().enumerate() {
         let baked = [full_texture(plane, Side::Both)];
         let rows = [plane_rows(&plane, Side::Both, l)];
-        assert_eq!(visibility(&baked, &rows, p), 1.0, "broken plane {k}");
-        assert_eq!(visibility_point_light(&baked, p + l, p), 1.0, "broken plane {k}, point light");
+        assert_eq!(visibility(&baked, &rows, &[0], p), 1.0, "broken plane {k}");
+        assert_eq!(visibility_point_light(&baked, &[0], p + l, p), 1.0, "broken plane {k}, point light");
     }
     // The sound plane does block there, and a broken light or receiver is lit.
     let baked = [full_texture(plane, Side::Both)];
-    assert_eq!(visibility(&baked, &[plane_rows(&plane, Side::Both, l)], p), 0.0);
-    assert_eq!(visibility(&baked, &[plane_rows(&plane, Side::Both, nan)], p), 1.0);
-    assert_eq!(visibility(&baked, &[plane_rows(&plane, Side::Both, l)], nan), 1.0);
-    assert_eq!(visibility_point_light(&baked, nan, p), 1.0);
+    assert_eq!(visibility(&baked, &[plane_rows(&plane, Side::Both, l)], &[0], p), 0.0);
+    assert_eq!(visibility(&baked, &[plane_rows(&plane, Side::Both, nan)], &[0], p), 1.0);
+    assert_eq!(visibility(&baked, &[plane_rows(&plane, Side::Both, l)], &[0], nan), 1.0);
+    assert_eq!(visibility_point_light(&baked, &[0], nan, p), 1.0);
 }
 
 #[test]
@@ -124,8 +124,12 @@ fn sides_and_bias_choose_the_receivers() {
         for (side, expected) in [(Side::Both, both), (Side::Front, front), (Side::Back, back)] {
             let baked = [full_texture(plane, side)];
             let rows = [plane_rows(&plane, side, light)];
-            assert_eq!(visibility(&baked, &rows, p), expected, "{side:?} y = {y} light {light}");
-            assert_eq!(visibility_point_light(&baked, p + light * 5.0, p), expected, "{side:?} y = {y} point light");
+            assert_eq!(visibility(&baked, &rows, &[0], p), expected, "{side:?} y = {y} light {light}");
+            assert_eq!(
+                visibility_point_light(&baked, &[0], p + light * 5.0, p),
+                expected,
+                "{side:?} y = {y} point light"
+            );
         }
     }
 }
@@ -184,9 +188,9 @@ fn point_lights_follow_the_formula() {
 #[test]
 fn samples_are_exact_at_centres_and_linear_between() {
     let (width, height) = (5, 3);
-    let coverage: Vec<u8> = (0..15).map(|i| (i * 53 % 256) as u8).collect();
-    let texture = OccluderTexture { width, height, coverage: coverage.clone() };
-    let texel = |x: usize, y: usize| f32::from(coverage[y * width + x]) / 255.0;
+    let texels: Vec<u8> = (0..15).map(|i| (i * 53 % 256) as u8).collect();
+    let texture = OccluderTexture { width, height, encoding: Encoding::Coverage, texels };
+    let texel = |x: usize, y: usize| f32::from(texture.texels[y * width + x]) / 255.0;
     let centre = |x: f32, n: usize| (x + 0.5) / n as f32;
     for y in 0..height {
         for x in 0..width {
@@ -210,16 +214,47 @@ fn planes_multiply() {
     let plane = ShadowPlane { origin: Vec3::new(-0.5, 0.0, -0.5), u: Vec3::Z, v: Vec3::X };
     let level = |value: u8, y: f32| {
         let mut baked = full_texture(ShadowPlane { origin: plane.origin + Vec3::Y * y, ..plane }, Side::Both);
-        baked.texture.coverage.fill(value);
+        baked.texture.texels.fill(value);
         baked
     };
     let planes = [level(51, 0.0), level(102, 0.3), level(255, 0.6)];
     let l = DVec3::new(0.1, 1.0, 0.05).normalize().as_vec3();
     let rows: Vec<_> = planes.iter().map(|b| plane_rows(&b.plane, b.side, l)).collect();
     for (y, expected) in [(-0.2, 0.0), (0.1, 0.0), (0.7, 1.0)] {
-        assert!((visibility(&planes, &rows, Vec3::Y * y) - expected).abs() < 1e-6, "y = {y}");
+        assert!((visibility(&planes, &rows, &[0, 1, 2], Vec3::Y * y) - expected).abs() < 1e-6, "y = {y}");
     }
-    let v = visibility(&planes[..2], &rows[..2], Vec3::Y * -0.2);
+    let v = visibility(&planes, &rows, &[0, 1], Vec3::Y * -0.2);
     assert!((v - 0.8 * 0.6).abs() < 1e-6, "{v}");
-    assert!((visibility_point_light(&planes[..2], l * 3.0, Vec3::Y * -0.2) - 0.8 * 0.6).abs() < 1e-6);
+    assert!((visibility_point_light(&planes, &[1, 0], l * 3.0, Vec3::Y * -0.2) - 0.8 * 0.6).abs() < 1e-6);
+}
+
+/// A distance field is read as coverage and cut at its border, so it has no grey.
+#[test]
+fn a_distance_field_is_cut_at_its_border() {
+    let texels: Vec<u8> = (0..15).map(|i| (i * 53 % 256) as u8).collect();
+    let coverage = OccluderTexture { width: 5, height: 3, encoding: Encoding::Coverage, texels };
+    let field = OccluderTexture { encoding: Encoding::Sdf, ..coverage.clone() };
+    for i in 0..2_000 {
+        let (a, b) = (uniform(71, i) as f32, uniform(72, i) as f32);
+        let expected = f32::from(u8::from(sample(&coverage, a, b) >= SDF_BORDER));
+        assert_eq!(sample(&field, a, b), expected, "{a}, {b}");
+    }
+    for (texel, open) in [(0, true), (127, true), (128, false), (255, false)] {
+        assert_eq!(field.is_open(texel), open, "{texel}");
+        let flat = OccluderTexture { texels: vec![texel; 15], ..field.clone() };
+        assert_eq!(sample(&flat, 0.3, 0.6), f32::from(u8::from(!open)), "{texel}");
+    }
+}
+
+#[test]
+fn the_direction_nearest_to_the_light_picks_the_lists() {
+    let lists = |first: u32| vec![vec![first], vec![]];
+    let set = BakedSet { sections: vec![vec![0, 1, 2], vec![2]], ..BakedSet::default() };
+    assert_eq!(set.lists(Vec3::Y), &set.sections);
+    let directions = vec![Vec3::X, Vec3::Y, Vec3::X];
+    let active = Some(ActiveLists { directions, lists: vec![lists(0), lists(1), lists(2)] });
+    let set = BakedSet { active, ..set };
+    assert_eq!(set.lists(Vec3::new(0.8, 0.6, 0.0)), &lists(0), "of two equal ones the first");
+    assert_eq!(set.lists(Vec3::new(0.6, 0.8, 0.0)), &lists(1));
+    assert_eq!(set.lists(Vec3::NEG_X), &lists(1));
 }

@@ -2,7 +2,7 @@
 
 use super::AssetError;
 use crate::gltf_file::Invalid;
-use serde::de::DeserializeOwned;
+use serde::{Deserialize, de::DeserializeOwned};
 use serde_json::Value;
 use std::path::Path;
 
@@ -49,6 +49,22 @@ impl<'a> At<'a> {
         let index: usize = self.parse()?;
         let outside = || self.error(format!("index {index} is out of range, there are {}", array.len()));
         array.get(index).cloned().ok_or_else(outside)
+    }
+
+    /// A list of indices below `limit`.
+    pub fn indices(&self, limit: usize) -> Result<Vec<u32>, AssetError> {
+        // The pointers of thousands of numbers are made where one is wrong.
+        if let Ok(indices) = <Vec<u32> as Deserialize>::deserialize(self.value)
+            && indices.iter().all(|index| (*index as usize) < limit)
+        {
+            return Ok(indices);
+        }
+        let index = |at: &Self| {
+            let index: u32 = at.parse()?;
+            let outside = || at.error(format!("index {index} is out of range, there are {limit}"));
+            if (index as usize) < limit { Ok(index) } else { Err(outside()) }
+        };
+        self.elements()?.iter().map(index).collect()
     }
 
     /// The value as a `T`.

@@ -5,7 +5,10 @@
 //! and those of the nodes above it are applied, so that a tool may move the whole model.
 
 use super::{
-    AssetError, Bounds, Channel, EXTENSION, Encoding, ModelPlane, Rectangle, ShadowSet, atlas, files, pointer::At,
+    AssetError, Bounds, Channel, EXTENSION, ModelPlane, Rectangle, ShadowSet, atlas,
+    extension::{is_unit, stranger},
+    files,
+    pointer::At,
 };
 use crate::{
     gltf_file::{GltfFile, UriError},
@@ -15,7 +18,7 @@ use glam::{DAffine3, DVec3};
 use image::{ImageFormat, ImageReader, RgbImage};
 use serde::Deserialize;
 use serde_json::Value;
-use shadowfit_solver::plane::{OccluderTexture, Side};
+use shadowfit_solver::plane::{ActiveLists, Encoding, OccluderTexture, SectionLists, Side};
 use std::{collections::BTreeMap, io::Cursor, path::Path};
 
 /// Reads the shadow planes of a GLB, a glTF or a sidecar.
@@ -54,13 +57,54 @@ fn read_set(at: &At<'_>, atlases: &mut Atlases<'_>) -> Result<ShadowSet, AssetEr
     }
     let entries = at.member("planes")?.elements()?;
     let planes = entries.iter().map(|entry| read_plane(entry, atlases)).collect::<Result<Vec<_>, _>>()?;
-    let mut sections = Vec::new();
-    for section in at.member("sections")?.elements()? {
-        let indices = section.elements()?;
-        indices.iter().try_for_each(|index| index.follow(&entries).map(|_| ()))?;
-        sections.push(section.parse()?);
+    let sections_at = at.member("sections")?;
+    let sections: SectionLists =
+        sections_at.elements()?.iter().map(|section| section.indices(entries.len())).collect::<Result<_, _>>()?;
+    if sections.is_empty() {
+        return Err(sections_at.error("one section is needed at least".into()));
     }
-    Ok(ShadowSet { bounds, planes, sections })
+    let active = at.optional("active").map(|active| read_active(&active, &sections)).transpose()?;
+    Ok(ShadowSet { bounds, planes, sections, active })
+}
+
+fn read_active(at: &At<'_>, sections: &SectionLists) -> Result<ActiveLists, AssetError> {
+    let mut directions = Vec::new();
+    for direction in at.member("directions")?.elements()? {
+        let vector: DVec3 = direction.parse()?;
+        if !is_unit(vector) {
+            return Err(direction.error(format!("of length {}, not 1", vector.length())));
+        }
+        directions.push(vector.as_vec3());
+    }
+    if directions.is_empty() {
+        return Err(at.member("directions")?.error("one direction is needed at least".into()));
+    }
+    let lists_at = at.member("lists")?;
+    let per_direction = lists_at.elements()?;
+    if per_direction.len() != directions.len() {
+        return Err(lists_at.error(format!("{} lists for {} directions", per_direction.len(), directions.len())));
+    }
+    let lists = per_direction.iter().map(|lists| read_lists(lists, sections)).collect::<Result<_, _>>()?;
+    Ok(ActiveLists { directions, lists })
+}
+
+/// One list a section, each a part of its section's.
+fn read_lists(at: &At<'_>, sections: &SectionLists) -> Result<SectionLists, AssetError> {
+    let found = at.elements()?;
+    if found.len() != sections.len() {
+        return Err(at.error(format!("{} lists for {} sections", found.len(), sections.len())));
+    }
+    let list = |(section, list): (usize, &At<'_>)| {
+        let part: Vec<u32> = list.indices(usize::MAX)?;
+        match stranger(&part, &sections[section]) {
+            None => Ok(part),
+            Some(i) => {
+                let why = format!("plane {} is not in the list of section {section}", part[i]);
+                Err(list.elements()?[i].error(why))
+            }
+        }
+    };
+    found.iter().enumerate().map(list).collect()
 }
 
 fn read_plane(at: &At<'_>, atlases: &mut Atlases<'_>) -> Result<ModelPlane, AssetError> {
@@ -72,7 +116,7 @@ fn read_plane(at: &At<'_>, atlases: &mut Atlases<'_>) -> Result<ModelPlane, Asse
     if let Some((member, why)) = rectangle.fault() {
         return Err(at.member(member)?.error(why.into()));
     }
-    let _: Encoding = at.member("encoding")?.parse()?;
+    let encoding: Encoding = at.member("encoding")?.parse()?;
     let side: Side = at.member("side")?.parse()?;
     let bias: f64 = at.member("bias")?.parse()?;
     if !(bias.is_finite() && bias >= 0.0) {
@@ -80,20 +124,24 @@ fn read_plane(at: &At<'_>, atlases: &mut Atlases<'_>) -> Result<ModelPlane, Asse
     }
     let channel: Channel = at.member("channel")?.parse()?;
     let atlas = atlases.get(&at.member("occluderTexture")?)?;
-    let texture = crop(atlas, &at.member("region")?, channel)?;
+    let texture = crop(atlas, &at.member("region")?, (channel, encoding))?;
     Ok(ModelPlane { rectangle, texture, side, bias })
 }
 
 /// One channel of a region of an atlas.
-fn crop(atlas: &RgbImage, region: &At<'_>, channel: Channel) -> Result<OccluderTexture, AssetError> {
+fn crop(
+    atlas: &RgbImage,
+    region: &At<'_>,
+    (channel, encoding): (Channel, Encoding),
+) -> Result<OccluderTexture, AssetError> {
     let [x, y, w, h]: [u32; 4] = region.parse()?;
     let inside = |start: u32, size: u32, limit: u32| start.checked_add(size).is_some_and(|end| end <= limit);
     if !inside(x, w, atlas.width()) || !inside(y, h, atlas.height()) {
         return Err(region.error(format!("not inside the texture of {} x {}", atlas.width(), atlas.height())));
     }
     let texels = (y..y + h).flat_map(|row| (x..x + w).map(move |column| (column, row)));
-    let coverage = texels.map(|(column, row)| atlas.get_pixel(column, row)[channel as usize]).collect();
-    let texture = OccluderTexture { width: w as usize, height: h as usize, coverage };
+    let texels = texels.map(|(column, row)| atlas.get_pixel(column, row)[channel as usize]).collect();
+    let texture = OccluderTexture { width: w as usize, height: h as usize, encoding, texels };
     atlas::checked_size(&texture).map_err(|why| region.error(why))?;
     Ok(texture)
 }
@@ -194,6 +242,12 @@ impl ShadowSet {
                 Side::Back if determinant < 0.0 => Side::Front,
                 side => side,
             };
+        }
+        if let Some(active) = &mut self.active {
+            // A direction towards the light is a vector of the frame's space like any other.
+            for direction in &mut active.directions {
+                *direction = transform.transform_vector3(direction.as_dvec3()).normalize().as_vec3();
+            }
         }
         let Bounds { min, max } = self.bounds;
         let corner =

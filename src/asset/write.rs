@@ -1,26 +1,29 @@
 //! Baked planes -> `STEM.shadow.glb`, `STEM.shadow.json`, `STEM.atlas-N.png`.
 //!
 //! In: the input model's file and the planes in unit space. Steps: open and check the input; pack and encode the
-//! textures; splice nodes, textures and the extension into the input's JSON text; append the pictures to the
-//! binary chunk (or name them by `uri` where the input has no binary chunk to append to); stage all files;
-//! rename them.
+//! textures; label the primitives; splice nodes, labels, textures and the extension into the input's JSON text;
+//! append new vertices and the pictures to the binary chunk (where the input has none to append to, the pictures are
+//! named by `uri` and the vertices go into `STEM.shadow.bin`); stage all files; rename them.
 
 use super::{
-    AssetError, Bounds, EXTENSION, Encoding, Extension, PlaneEntry, PlaneSet, Rectangle, TextureRef,
-    atlas::{self, Atlas, Layout},
+    AssetError, Bounds, EXTENSION, Extension, TextureRef,
+    atlas::{self, Atlas},
+    document::{self, Additions, Home, Picture},
     files::{self, Batch},
-    splice::{Edits, Spot},
+    labels::Labels,
 };
-use crate::gltf_file::{
-    External, GltfFile, Invalid, Kind,
-    container::{self, Chunks},
-    uri,
+use crate::{
+    gltf_file::{
+        External, GltfFile, Kind,
+        container::{self, Chunks},
+        uri,
+    },
+    scene::Origin,
 };
-use gltf::json::texture::{MagFilter, MinFilter, WrappingMode};
-use serde_json::{Value, json};
+use serde_json::Value;
 use shadowfit_solver::{
     mesh::Frame,
-    plane::{BakedPlane, OccluderTexture},
+    plane::{BakedSet, OccluderTexture},
 };
 use std::{
     fmt, io,
@@ -40,8 +43,12 @@ pub struct AssetRequest<'a> {
     pub frame: &'a Frame,
     /// Box of the receivers.
     pub bounds: Bounds,
-    /// The planes in unit space, all in one section. None means "no self-shadow".
-    pub planes: &'a [BakedPlane],
+    /// The planes in unit space. None means "no self-shadow".
+    pub set: &'a BakedSet,
+    /// [`Scene::origins`](crate::scene::Scene::origins) of the input. Used where there are several sections.
+    pub origins: &'a [Origin],
+    /// The section of each triangle of the scene; copies of a mesh agree. Used where there are several.
+    pub section_of: &'a [u32],
 }
 
 /// An atlas on the disk.
@@ -66,6 +73,8 @@ pub struct Written {
     pub sidecar: PathBuf,
     /// `STEM.atlas-0.png`, ...
     pub atlases: Vec<WrittenAtlas>,
+    /// `STEM.shadow.bin`, where there had to be one.
+    pub buffer: Option<PathBuf>,
     /// Files of the model that lie beside the output now.
     pub copied: Vec<PathBuf>,
     /// Paths and URIs of images that the model names and that were not there to be copied.
@@ -77,6 +86,12 @@ pub struct Written {
 }
 
 impl Written {
+    /// All files but copies.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let atlases = self.atlases.iter().map(|atlas| &atlas.path);
+        [&self.model, &self.sidecar].into_iter().chain(atlases).chain(&self.buffer).map(PathBuf::as_path)
+    }
+
     /// Bytes of the atlases as PNG files.
     #[must_use]
     pub fn png_bytes(&self) -> u64 {
@@ -104,12 +119,14 @@ pub fn write(request: &AssetRequest<'_>) -> Result<Written, AssetError> {
     let bytes = files::read(request.input)?;
     let source = Source::new(request.input, &bytes)?;
     let outputs = Outputs::new(request)?;
-    let textures: Vec<&OccluderTexture> = request.planes.iter().map(|baked| &baked.texture).collect();
+    let textures: Vec<&OccluderTexture> = request.set.planes.iter().map(|baked| &baked.texture).collect();
     let (layout, atlases) = atlas::build(&textures)?;
     let pictures = pictures(request.stem, &atlases);
-    let model = source.extended(&pictures, |first| extension(request, &layout, |i| TextureRef::Index(first + i)))?;
-    let sidecar = extension(request, &layout, |i| TextureRef::Uri(pictures[i].uri.clone()))?;
-    let sidecar = format!("{:#}\n", json!(sidecar));
+    let sidecar = Extension::new(request, &layout, |i| TextureRef::Uri(pictures[i].uri.clone()))?.lines()?;
+    let labels = Labels::new(request, &source.file)?;
+    let (model, buffer) = source.extended((&pictures, &labels, request.stem), |first| {
+        Extension::new(request, &layout, |i| TextureRef::Index(first + i))?.text()
+    })?;
 
     let (externals, not_copied) = source.externals()?;
     let atlas_paths: Vec<PathBuf> = (0..atlases.len()).map(|i| outputs.atlas(i)).collect();
@@ -121,7 +138,10 @@ pub fn write(request: &AssetRequest<'_>) -> Result<Written, AssetError> {
     for (path, atlas) in atlas_paths.iter().zip(&atlases) {
         batch.stage(path, &atlas.png)?;
     }
-    batch.stage(&outputs.sidecar(), sidecar.as_bytes())?;
+    if let Some(buffer) = &buffer {
+        batch.stage(&outputs.buffer(), buffer)?;
+    }
+    batch.stage(&outputs.sidecar(), &sidecar)?;
     batch.stage(&outputs.model(), &model)?;
     batch.commit()?;
 
@@ -135,9 +155,10 @@ pub fn write(request: &AssetRequest<'_>) -> Result<Written, AssetError> {
         model: outputs.model(),
         sidecar: outputs.sidecar(),
         atlases: atlases.collect(),
+        buffer: buffer.map(|_| outputs.buffer()),
         copied: externals.iter().map(|external| outputs.folder.join(&external.relative)).collect(),
         not_copied,
-        planes: request.planes.len(),
+        planes: request.set.planes.len(),
         texture_bytes: layout.texture_bytes(),
     })
 }
@@ -150,7 +171,7 @@ pub fn check_input(input: &Path) -> Result<(), AssetError> {
     let bytes = files::read(input)?;
     let source = Source::new(input, &bytes)?;
     source.externals()?;
-    source.extended(&[], |_| Ok(Extension { sets: Vec::new() }))?;
+    source.extended((&[], &Labels::default(), ""), |_| Extension { sets: Vec::new() }.text())?;
     Ok(())
 }
 
@@ -192,10 +213,14 @@ impl<'a> Outputs<'a> {
         self.folder.join(format!("{}.shadow.json", self.stem))
     }
 
+    fn buffer(&self) -> PathBuf {
+        self.folder.join(buffer_name(self.stem))
+    }
+
     /// What a fit writes beside the atlases: by this module, and by the report.
-    fn but_atlases(&self) -> [PathBuf; 4] {
+    fn but_atlases(&self) -> [PathBuf; 5] {
         let other = |ending: &str| self.folder.join(format!("{}.{ending}", self.stem));
-        [self.model(), self.sidecar(), other("report.json"), other("compare.png")]
+        [self.model(), self.sidecar(), self.buffer(), other("report.json"), other("compare.png")]
     }
 
     fn atlas(&self, index: usize) -> PathBuf {
@@ -219,11 +244,8 @@ fn atlas_name(stem: &str, index: usize) -> String {
     format!("{stem}.atlas-{index}.png")
 }
 
-/// An atlas as the documents name it.
-struct Picture<'a> {
-    name: String,
-    uri: String,
-    png: &'a [u8],
+fn buffer_name(stem: &str) -> String {
+    format!("{stem}.shadow.bin")
 }
 
 fn pictures<'a>(stem: &str, atlases: &'a [Atlas]) -> Vec<Picture<'a>> {
@@ -233,40 +255,6 @@ fn pictures<'a>(stem: &str, atlases: &'a [Atlas]) -> Vec<Picture<'a>> {
         png: &atlas.png,
     };
     atlases.iter().enumerate().map(picture).collect()
-}
-
-/// The extension's root object; `texture` names an atlas.
-fn extension(
-    request: &AssetRequest<'_>,
-    layout: &Layout,
-    texture: impl Fn(usize) -> TextureRef,
-) -> Result<Extension, AssetError> {
-    if !request.bounds.is_box() {
-        return Err(AssetError::Bounds { bounds: request.bounds });
-    }
-    let mut planes = Vec::with_capacity(request.planes.len());
-    for (plane, (baked, place)) in request.planes.iter().zip(&layout.placements).enumerate() {
-        let rectangle = Rectangle::from_unit_space(&baked.plane, request.frame);
-        let bias = f64::from(baked.bias) * request.frame.radius;
-        let bias_fault = (!(bias.is_finite() && bias >= 0.0)).then_some(("bias", "not a finite number from 0 up"));
-        if let Some((member, why)) = rectangle.fault().or(bias_fault) {
-            return Err(AssetError::Plane { plane, why: format!("{member}: {why}") });
-        }
-        let [width, height] = [baked.texture.width as u32, baked.texture.height as u32];
-        planes.push(PlaneEntry {
-            origin: rectangle.origin,
-            u_axis: rectangle.u_axis,
-            v_axis: rectangle.v_axis,
-            occluder_texture: texture(place.atlas),
-            region: [place.x, place.y, width, height],
-            channel: place.channel,
-            encoding: Encoding::Coverage,
-            side: baked.side,
-            bias,
-        });
-    }
-    let sections = vec![(0..planes.len()).collect()];
-    Ok(Extension { sets: vec![PlaneSet { bounds: request.bounds, planes, sections }] })
 }
 
 /// The input model, opened and checked.
@@ -307,26 +295,33 @@ impl<'a> Source<'a> {
         Ok((found, not_copied))
     }
 
-    /// The output GLB. `set` makes the extension's root object from the index of the first atlas texture.
+    /// The output GLB, and the bytes of the file beside it where the new vertices cannot go into its binary chunk.
+    /// `extension` makes the root object's text from the index of the first atlas texture.
     fn extended(
         &self,
-        pictures: &[Picture<'_>],
-        set: impl FnOnce(usize) -> Result<Extension, AssetError>,
-    ) -> Result<Vec<u8>, AssetError> {
+        (pictures, labels, stem): (&[Picture<'_>], &Labels, &str),
+        extension: impl FnOnce(usize) -> Result<String, AssetError>,
+    ) -> Result<(Vec<u8>, Option<Vec<u8>>), AssetError> {
         let place = |fault| AssetError::invalid(self.file.path(), fault);
-        let set = set(self.file.root().get("textures").and_then(Value::as_array).map_or(0, Vec::len))?;
-        // Pictures go behind the binary chunk where buffer 0 is that chunk.
+        // Additions go behind the binary chunk where buffer 0 is that chunk.
         let has_own_buffer = self.file.root().pointer("/buffers/0").is_some_and(|buffer| buffer.get("uri").is_none());
         let mut bin = self.file.chunks().bin.map(<[u8]>::to_vec);
-        let mut offsets = None;
-        if let (Some(bin), true, false) = (&mut bin, has_own_buffer, pictures.is_empty()) {
-            offsets = Some(append(bin, pictures));
+        let home = match &bin {
+            Some(bin) if has_own_buffer => Home::Chunk { start: bin.len() },
+            _ => Home::File { uri: uri::encode(&buffer_name(stem)) },
+        };
+        let additions = Additions { pictures, labels, home };
+        let json = document::spliced(self.file.chunks().json, &additions, extension, place)?;
+        let blocks = document::blocks(&additions);
+        let mut beside = Vec::new();
+        match (&mut bin, &additions.home) {
+            (Some(bin), Home::Chunk { .. }) => document::append(bin, &blocks),
+            _ => document::append(&mut beside, &blocks),
         }
-        let buffer_end = bin.as_ref().map_or(0, Vec::len);
-        let json = spliced(self.file.chunks().json, &json!(set), &Pictures { pictures, offsets, buffer_end })
-            .map_err(place)?;
         let chunks = Chunks { json: &json, bin: bin.as_deref(), others: self.file.chunks().others.clone() };
-        container::join(&chunks).map_err(|why| AssetError::Malformed { path: self.file.path().into(), why })
+        let model = container::join(&chunks);
+        let model = model.map_err(|why| AssetError::Malformed { path: self.file.path().into(), why })?;
+        Ok((model, (!beside.is_empty()).then_some(beside)))
     }
 }
 
@@ -349,127 +344,4 @@ fn fitted_already(root: &Value) -> Option<String> {
 /// The elements of an array member, none where it is missing.
 fn list<'a>(value: &'a Value, key: &str) -> &'a [Value] {
     value.get(key).and_then(Value::as_array).map_or(&[], Vec::as_slice)
-}
-
-/// Appends the pictures, each at a multiple of four, and returns their offsets.
-fn append(bin: &mut Vec<u8>, pictures: &[Picture<'_>]) -> Vec<usize> {
-    let mut offsets = Vec::with_capacity(pictures.len());
-    for picture in pictures {
-        bin.resize(bin.len().next_multiple_of(4), 0);
-        offsets.push(bin.len());
-        bin.extend_from_slice(picture.png);
-    }
-    offsets
-}
-
-/// What the document has to name.
-struct Pictures<'a> {
-    pictures: &'a [Picture<'a>],
-    /// Offsets in buffer 0, or `None` where the pictures are files.
-    offsets: Option<Vec<usize>>,
-    /// Length of buffer 0 with the pictures.
-    buffer_end: usize,
-}
-
-/// The document with the frame node, the atlases and the extension.
-fn spliced(text: &str, set: &Value, pictures: &Pictures<'_>) -> Result<String, Invalid> {
-    let root = Spot::root(text)?;
-    let mut document = Document { members: root.members()?, edits: Edits::default(), new: Vec::new() };
-    let frame_node = json!({ "name": "shadow planes", "extensions": { EXTENSION: { "set": 0 } } });
-    let node = document.append("nodes", &[frame_node])?;
-    document.add_to_scene(node)?;
-    if !pictures.pictures.is_empty() {
-        document.add_textures(pictures)?;
-    }
-    let used = document.member("extensionsUsed").map(|spot| spot.slice().to_owned()).unwrap_or_default();
-    let declared = serde_json::from_str::<Vec<String>>(&used).is_ok_and(|names| names.iter().any(|n| n == EXTENSION));
-    if !declared {
-        document.append("extensionsUsed", &[json!(EXTENSION)])?;
-    }
-    match document.member("extensions") {
-        Some(extensions) => document.edits.add_members(&extensions, &[(EXTENSION, set.to_string())])?,
-        None => document.new.push(("extensions", json!({ EXTENSION: set }).to_string())),
-    }
-    document.edits.add_members(&root, &document.new)?;
-    Ok(document.edits.apply(text))
-}
-
-/// A glTF document with its edits.
-struct Document<'a> {
-    members: Vec<(String, Spot<'a>)>,
-    edits: Edits,
-    /// Members that the root has not got yet.
-    new: Vec<(&'static str, String)>,
-}
-
-impl<'a> Document<'a> {
-    fn member(&self, key: &str) -> Option<Spot<'a>> {
-        self.members.iter().find_map(|(k, spot)| (k == key).then(|| spot.clone()))
-    }
-
-    /// Appends to an array of the root, which is made where it is missing. Returns the first new index.
-    fn append(&mut self, key: &'static str, elements: &[Value]) -> Result<usize, Invalid> {
-        match self.member(key) {
-            Some(array) => {
-                let texts: Vec<String> = elements.iter().map(Value::to_string).collect();
-                self.edits.append(&array, &texts)?;
-                Ok(array.elements()?.len())
-            }
-            None => {
-                self.new.push((key, json!(elements).to_string()));
-                Ok(0)
-            }
-        }
-    }
-
-    /// Makes the node a root of the default scene: the one that `scene` names, else the first, else none.
-    fn add_to_scene(&mut self, node: usize) -> Result<(), Invalid> {
-        let Some(scenes) = self.member("scenes") else { return Ok(()) };
-        let scenes = scenes.elements()?;
-        let index = self.member("scene").map_or(Ok(0), |spot| spot.slice().parse::<usize>());
-        let Some(scene) = index.ok().and_then(|i| scenes.get(i)) else {
-            let reason = format!("not one of the {} scenes", scenes.len());
-            return if scenes.is_empty() { Ok(()) } else { Err(Invalid { pointer: "/scene".into(), reason }) };
-        };
-        match scene.member("nodes")? {
-            Some(nodes) => self.edits.append(&nodes, &[node.to_string()]),
-            None => self.edits.add_members(scene, &[("nodes", format!("[{node}]"))]),
-        }
-    }
-
-    /// Sampler, images, textures, and for pictures inside the file buffer views and the buffer's new length.
-    fn add_textures(&mut self, pictures: &Pictures<'_>) -> Result<(), Invalid> {
-        let clamp = WrappingMode::ClampToEdge;
-        let sampler =
-            json!({ "magFilter": MagFilter::Linear, "minFilter": MinFilter::Linear, "wrapS": clamp, "wrapT": clamp });
-        let sampler = self.append("samplers", &[sampler])?;
-        let names = pictures.pictures.iter();
-        let images: Vec<Value> = match &pictures.offsets {
-            Some(offsets) => {
-                let sizes = names.clone().map(|picture| picture.png.len());
-                let views = offsets
-                    .iter()
-                    .zip(sizes)
-                    .map(|(&offset, length)| json!({ "buffer": 0, "byteOffset": offset, "byteLength": length }));
-                let first = self.append("bufferViews", &views.collect::<Vec<_>>())?;
-                self.lengthen_buffer(pictures.buffer_end)?;
-                let image = |(i, picture): (usize, &Picture<'_>)| json!({ "name": picture.name, "mimeType": "image/png", "bufferView": first + i });
-                names.enumerate().map(image).collect()
-            }
-            None => names.map(|picture| json!({ "name": picture.name, "uri": picture.uri })).collect(),
-        };
-        let first = self.append("images", &images)?;
-        let texture = |(i, picture): (usize, &Picture<'_>)| json!({ "name": picture.name, "sampler": sampler, "source": first + i });
-        let textures: Vec<Value> = pictures.pictures.iter().enumerate().map(texture).collect();
-        self.append("textures", &textures)?;
-        Ok(())
-    }
-
-    fn lengthen_buffer(&mut self, length: usize) -> Result<(), Invalid> {
-        let missing = || Invalid { pointer: "/buffers/0/byteLength".into(), reason: "missing".into() };
-        let buffers = self.member("buffers").ok_or_else(missing)?.elements()?;
-        let byte_length = buffers.first().ok_or_else(missing)?.member("byteLength")?.ok_or_else(missing)?;
-        self.edits.replace(&byte_length, length.to_string());
-        Ok(())
-    }
 }

@@ -5,7 +5,7 @@
 //! a neighbour is read.
 
 use super::RenderError;
-use shadowfit_solver::plane::OccluderTexture;
+use shadowfit_solver::plane::{Encoding, OccluderTexture};
 
 /// Where one texture lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -18,6 +18,8 @@ pub struct Slot {
     pub layer: u32,
     /// 0 to 3.
     pub channel: u32,
+    /// What a texel means.
+    pub encoding: Encoding,
 }
 
 /// All textures of a list of planes.
@@ -89,7 +91,8 @@ fn shelve(textures: &[&OccluderTexture], side: u32) -> Vec<Slot> {
         if y + size[1] > side {
             (x, y, row_height, page) = (0, 0, 0, page + 1);
         }
-        slots[i] = Slot { corner: [x, y], size, layer: page / 4, channel: page % 4 };
+        let encoding = textures[i].encoding;
+        slots[i] = Slot { corner: [x, y], size, layer: page / 4, channel: page % 4, encoding };
         (x, row_height) = (x + size[0], row_height.max(size[1]));
     }
     slots
@@ -97,10 +100,10 @@ fn shelve(textures: &[&OccluderTexture], side: u32) -> Vec<Slot> {
 
 fn copy(texture: &OccluderTexture, slot: &Slot, side: usize, rgba: &mut [u8]) {
     let [left, top] = slot.corner.map(|n| n as usize);
-    for (row, texels) in texture.coverage.chunks_exact(texture.width).enumerate() {
+    for (row, texels) in texture.texels.chunks_exact(texture.width).enumerate() {
         let first = ((slot.layer as usize * side + top + row) * side + left) * 4 + slot.channel as usize;
-        for (column, &coverage) in texels.iter().enumerate() {
-            rgba[first + 4 * column] = coverage;
+        for (column, &texel) in texels.iter().enumerate() {
+            rgba[first + 4 * column] = texel;
         }
     }
 }
@@ -109,8 +112,8 @@ fn copy(texture: &OccluderTexture, slot: &Slot, side: usize, rgba: &mut [u8]) {
 mod tests {
     use super::*;
 
-    fn texture(width: usize, height: usize, coverage: u8) -> OccluderTexture {
-        OccluderTexture { width, height, coverage: vec![coverage; width * height] }
+    fn texture(width: usize, height: usize, texel: u8) -> OccluderTexture {
+        OccluderTexture { width, height, encoding: Encoding::Coverage, texels: vec![texel; width * height] }
     }
 
     #[test]
@@ -122,11 +125,11 @@ mod tests {
             for y in slot.corner[1]..slot.corner[1] + slot.size[1] {
                 for x in slot.corner[0]..slot.corner[0] + slot.size[0] {
                     let texel = ((slot.layer * atlas.side + y) * atlas.side + x) * 4 + slot.channel;
-                    assert_eq!(atlas.rgba[texel as usize], texture.coverage[0]);
+                    assert_eq!(atlas.rgba[texel as usize], texture.texels[0]);
                 }
             }
         }
-        let written: usize = textures.iter().map(|t| t.coverage.len()).sum();
+        let written: usize = textures.iter().map(|t| t.texels.len()).sum();
         assert_eq!(atlas.rgba.iter().filter(|&&byte| byte != 0).count(), written, "regions overlap");
     }
 

@@ -15,7 +15,7 @@ use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 use shadowfit_solver::{
     mesh::{Mesh, Sides},
-    plane::BakedPlane,
+    plane::BakedSet,
     shade,
 };
 use std::sync::LazyLock;
@@ -201,7 +201,7 @@ fn bilinear(image: &image::RgbaImage, repeat: [bool; 2], uv: Vec2) -> Vec3 {
 pub struct Turntable<'a> {
     scene: &'a Scene,
     mesh: &'a Mesh,
-    planes: Vec<BakedPlane>,
+    set: BakedSet,
     /// Of the last frame: a second light from the same camera traces nothing.
     primary: Option<(Camera, Primary)>,
 }
@@ -210,12 +210,12 @@ impl<'a> Turntable<'a> {
     /// Draws `scene`, whose triangles `mesh` holds. There are no planes yet.
     #[must_use]
     pub fn new(scene: &'a Scene, mesh: &'a Mesh) -> Self {
-        Self { scene, mesh, planes: Vec::new(), primary: None }
+        Self { scene, mesh, set: BakedSet::default(), primary: None }
     }
 
     /// Replaces the planes (unit space) that cast in the frames to come.
-    pub fn set_planes(&mut self, planes: &[BakedPlane]) {
-        self.planes = planes.to_vec();
+    pub fn set_planes(&mut self, set: &BakedSet) {
+        self.set = set.clone();
     }
 
     /// Draws a frame.
@@ -235,16 +235,21 @@ impl<'a> Turntable<'a> {
         };
         let (_, primary) = self.primary.insert((request.camera, primary));
         let models = (self.scene, self.mesh);
+        // The section's list; none where a triangle is in no section.
+        let lists = self.set.lists(request.light.from_centre());
+        let list = |hit: &PrimaryHit| {
+            let section = self.scene.section_of[self.mesh.source[hit.triangle as usize] as usize];
+            lists.get(section as usize).map_or(&[][..], Vec::as_slice)
+        };
+        let planes = &self.set.planes;
         match request.light {
             Light::Directional { to_light } => {
-                let rows: Vec<_> =
-                    self.planes.iter().map(|baked| shade::plane_rows(&baked.plane, baked.side, to_light)).collect();
-                let visibility = |hit: &PrimaryHit| shade::visibility(&self.planes, &rows, hit.p_unit);
+                let rows = shade::set_rows(&self.set, to_light);
+                let visibility = |hit: &PrimaryHit| shade::visibility(planes, &rows, list(hit), hit.p_unit);
                 primary.picture(models, options.mode, &request.light, visibility)
             }
-            Light::Point { position_unit } => {
-                let visibility =
-                    |hit: &PrimaryHit| shade::visibility_point_light(&self.planes, position_unit, hit.p_unit);
+            Light::Point { position_unit: c } => {
+                let visibility = |hit: &PrimaryHit| shade::visibility_point_light(planes, list(hit), c, hit.p_unit);
                 primary.picture(models, options.mode, &request.light, visibility)
             }
         }

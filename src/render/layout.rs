@@ -5,7 +5,7 @@ use super::atlas::Slot;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3, Vec4};
 use shadowfit_solver::{
-    plane::{BakedPlane, ShadowPlane, Side},
+    plane::{BakedPlane, Encoding, ShadowPlane, Side},
     shade::{self, PlaneRows},
 };
 use std::mem::offset_of;
@@ -16,8 +16,8 @@ use std::mem::offset_of;
 pub struct Frame {
     pub clip_from_unit: Mat4,
     pub light: Vec4,
-    pub casting_count: u32,
     pub rectangle_count: u32,
+    pub section_count: u32,
     pub padding: [u32; 2],
 }
 
@@ -28,14 +28,19 @@ pub struct OccluderSlot {
     pub region: Vec4,
     pub layer: u32,
     pub channel: u32,
-    pub padding: [u32; 2],
+    pub encoding: u32,
+    pub padding: u32,
 }
 
 impl From<&Slot> for OccluderSlot {
     fn from(slot: &Slot) -> Self {
         let ([x, y], [w, h]) = (slot.corner, slot.size);
         let region = Vec4::from_array([x, y, w, h].map(|n| n as f32));
-        Self { region, layer: slot.layer, channel: slot.channel, padding: [0; 2] }
+        let encoding = match slot.encoding {
+            Encoding::Coverage => 0,
+            Encoding::Sdf => 1,
+        };
+        Self { region, layer: slot.layer, channel: slot.channel, encoding, padding: 0 }
     }
 }
 
@@ -139,11 +144,12 @@ pub struct Vertex {
     pub shading_normal: Vec3,
     pub uv: glam::Vec2,
     pub material: u32,
+    pub section: u32,
 }
 
 /// Attributes of [`Vertex`], in the order of their locations.
-pub const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 5] =
-    wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3, 3 => Float32x2, 4 => Uint32];
+pub const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 6] =
+    wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3, 3 => Float32x2, 4 => Uint32, 5 => Uint32];
 
 /// How Rust lays out a struct of the shaders.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -170,8 +176,8 @@ macro_rules! layout {
 #[must_use]
 pub fn struct_layouts() -> Vec<StructLayout> {
     vec![
-        layout!(Frame { clip_from_unit, light, casting_count, rectangle_count }),
-        layout!(OccluderSlot { region, layer, channel }),
+        layout!(Frame { clip_from_unit, light, rectangle_count, section_count }),
+        layout!(OccluderSlot { region, layer, channel, encoding }),
         layout!(CastingPlane { a, b, s, slot, bias, side }),
         layout!(Rectangle { origin, u, v, plane, a, b, color, slot }),
         layout!(Material { base_color, alpha_cutoff, repeat_u, repeat_v }),

@@ -5,7 +5,7 @@ use super::{
     gpu::{FORWARD, Gpu, PLANE_RECTANGLES},
     layout::{VERTEX_ATTRIBUTES, Vertex},
 };
-use shadowfit_solver::shade::EDGE_ON;
+use shadowfit_solver::{plane::SDF_BORDER, shade::EDGE_ON};
 use std::collections::BTreeMap;
 
 /// Depth buffer of every frame.
@@ -90,6 +90,7 @@ impl Layouts {
                 (fragment, texture(TextureViewDimension::D2Array)),
                 (fragment, sampler),
                 (both, storage),
+                (fragment, storage),
             ],
         );
         let base_image = texture(TextureViewDimension::D2);
@@ -130,8 +131,9 @@ impl Pipelines {
     }
 }
 
-fn constants_of(key: PipelineKey) -> [(&'static str, f64); 2] {
-    [("POINT_LIGHT", f64::from(u8::from(key.point_light))), ("EDGE_ON", f64::from(EDGE_ON))]
+fn constants_of(key: PipelineKey) -> [(&'static str, f64); 3] {
+    let point_light = f64::from(u8::from(key.point_light));
+    [("POINT_LIGHT", point_light), ("EDGE_ON", f64::from(EDGE_ON)), ("SDF_BORDER", f64::from(SDF_BORDER))]
 }
 
 fn multisample(key: PipelineKey) -> wgpu::MultisampleState {

@@ -1,8 +1,8 @@
 //! The wgpu renderer: a scene and its planes are uploaded once, then frames are drawn.
 //!
 //! A frame is one forward pass. The affine rows of each plane (thesis eq. 2-8, see `solver::shade`) are computed on
-//! the CPU once per light; a plane that casts nothing under that light is not sent, so it costs no fragment
-//! anything. The same request gives the same bytes on the same driver.
+//! the CPU once per light, and the lists of the sections chosen; a plane that casts nothing under that light is in
+//! none of them, so it costs no fragment anything. The same request gives the same bytes on the same driver.
 
 use super::{
     BACKGROUND_LINEAR, FrameOptions, FrameRequest, Light, Mode, RenderError,
@@ -15,7 +15,10 @@ use super::{
 use crate::scene::Scene;
 use bytemuck::Zeroable;
 use glam::{Vec3, Vec4};
-use shadowfit_solver::{mesh::Frame, plane::BakedPlane};
+use shadowfit_solver::{
+    mesh::Frame,
+    plane::{BakedPlane, BakedSet},
+};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 
 /// Okabe and Ito, "Color Universal Design" (2008), sRGB, without black and the yellow that vanishes on light
@@ -42,7 +45,7 @@ impl Turntable {
     pub fn new(gpu: &Gpu, scene: &Scene, frame: &Frame) -> Result<Self, RenderError> {
         let layouts = Layouts::new(gpu);
         let model = Model::upload(gpu, &layouts, scene, frame)?;
-        let planes = Planes::upload(gpu, &layouts, &[])?;
+        let planes = Planes::upload(gpu, &layouts, &BakedSet::default())?;
         let pipelines = Pipelines::new(gpu);
         gpu.check()?;
         Ok(Self { gpu: gpu.clone(), layouts, pipelines, model, planes, targets: None })
@@ -52,8 +55,8 @@ impl Turntable {
     ///
     /// # Errors
     /// Their textures exceed the adapter's limits, or the driver reports an error.
-    pub fn set_planes(&mut self, planes: &[BakedPlane]) -> Result<(), RenderError> {
-        self.planes = Planes::upload(&self.gpu, &self.layouts, planes)?;
+    pub fn set_planes(&mut self, set: &BakedSet) -> Result<(), RenderError> {
+        self.planes = Planes::upload(&self.gpu, &self.layouts, set)?;
         self.gpu.check()
     }
 
@@ -133,17 +136,20 @@ fn keys(request: &FrameRequest) -> [PipelineKey; 4] {
 /// The planes on the device.
 #[derive(Debug)]
 struct Planes {
-    baked: Vec<(BakedPlane, Slot)>,
+    set: BakedSet,
+    /// One a plane.
+    slots: Vec<Slot>,
     uniform: wgpu::Buffer,
     casting: wgpu::Buffer,
+    lists: wgpu::Buffer,
     rectangles: wgpu::Buffer,
     bind_group: wgpu::BindGroup,
 }
 
 impl Planes {
-    fn upload(gpu: &Gpu, layouts: &Layouts, planes: &[BakedPlane]) -> Result<Self, RenderError> {
+    fn upload(gpu: &Gpu, layouts: &Layouts, set: &BakedSet) -> Result<Self, RenderError> {
         let limits = gpu.limits();
-        let textures: Vec<_> = planes.iter().map(|baked| &baked.texture).collect();
+        let textures: Vec<_> = set.planes.iter().map(|baked| &baked.texture).collect();
         let atlas = Atlas::pack(&textures, limits.max_texture_dimension_2d, limits.max_texture_array_layers)?;
         let view = upload_atlas(gpu, &atlas);
         let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
@@ -161,10 +167,12 @@ impl Planes {
             })
         };
         // A binding may not be empty.
-        let count = planes.len().max(1);
+        let count = set.planes.len().max(1);
+        let storage = wgpu::BufferUsages::STORAGE;
         let uniform = buffer("frame", size_of::<FrameUniform>(), wgpu::BufferUsages::UNIFORM);
-        let casting = buffer("casting", count * size_of::<CastingPlane>(), wgpu::BufferUsages::STORAGE);
-        let rectangles = buffer("rectangles", count * size_of::<Rectangle>(), wgpu::BufferUsages::STORAGE);
+        let casting = buffer("casting", count * size_of::<CastingPlane>(), storage);
+        let rectangles = buffer("rectangles", count * size_of::<Rectangle>(), storage);
+        let lists = buffer("lists", size_of::<u32>() * (2 * (set.sections.len() + 1) + longest(set)), storage);
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("frame"),
@@ -175,15 +183,15 @@ impl Planes {
                 entry(2, wgpu::BindingResource::TextureView(&view)),
                 entry(3, wgpu::BindingResource::Sampler(&sampler)),
                 entry(4, rectangles.as_entire_binding()),
+                entry(5, lists.as_entire_binding()),
             ],
         });
-        let baked = planes.iter().cloned().zip(atlas.slots).collect();
-        Ok(Self { baked, uniform, casting, rectangles, bind_group })
+        Ok(Self { set: set.clone(), slots: atlas.slots, uniform, casting, lists, rectangles, bind_group })
     }
 
     /// Sends what depends on the light and the camera; returns the number of rectangles to draw.
     fn write(&self, gpu: &Gpu, request: &FrameRequest) -> u32 {
-        let casting = self.casting_under(&request.light);
+        let (casting, lists) = self.casting_under(&request.light);
         let rectangles = match request.options.mode {
             Mode::Planes => self.rectangles_seen_along(request.camera.forward()),
             Mode::Shaded | Mode::Mask => Vec::new(),
@@ -195,34 +203,59 @@ impl Planes {
         let frame = FrameUniform {
             clip_from_unit: request.camera.clip_from_unit(request.options.size_px),
             light: light.extend(0.0),
-            casting_count: casting.len() as u32,
             rectangle_count: rectangles.len() as u32,
+            section_count: self.set.sections.len() as u32,
             ..FrameUniform::zeroed()
         };
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&frame));
         gpu.queue.write_buffer(&self.casting, 0, bytemuck::cast_slice(&casting));
+        gpu.queue.write_buffer(&self.lists, 0, bytemuck::cast_slice(&lists));
         gpu.queue.write_buffer(&self.rectangles, 0, bytemuck::cast_slice(&rectangles));
         rectangles.len() as u32
     }
 
-    /// The planes that cast under `light`, in their order.
-    fn casting_under(&self, light: &Light) -> Vec<CastingPlane> {
-        let casting = |(baked, slot): &(BakedPlane, Slot)| match *light {
-            Light::Directional { to_light } => CastingPlane::directional(baked, slot, to_light),
-            Light::Point { .. } => CastingPlane::point_light(baked, slot),
+    /// The planes that cast under `light` and are read by some section, and `lists` of planes.wgsl.
+    fn casting_under(&self, light: &Light) -> (Vec<CastingPlane>, Vec<u32>) {
+        let casting_plane = |index: usize| match (*light, &self.set.planes[index], &self.slots[index]) {
+            (Light::Directional { to_light }, baked, slot) => CastingPlane::directional(baked, slot, to_light),
+            (Light::Point { .. }, baked, slot) => CastingPlane::point_light(baked, slot),
         };
-        self.baked.iter().filter_map(casting).collect()
+        let sections = self.set.lists(light.from_centre());
+        let (mut casting, mut ranges, mut lists) = (Vec::new(), Vec::new(), Vec::new());
+        // Several sections may read a plane: its rows are made once.
+        let mut number_of: Vec<Option<Option<u32>>> = vec![None; self.set.planes.len()];
+        let start = 2 * (self.set.sections.len() + 1);
+        for section in 0..=self.set.sections.len() {
+            ranges.push((start + lists.len()) as u32);
+            for &plane in sections.get(section).map_or(&[][..], Vec::as_slice) {
+                let number = number_of[plane as usize].get_or_insert_with(|| {
+                    casting.push(casting_plane(plane as usize)?);
+                    Some(casting.len() as u32 - 1)
+                });
+                lists.extend(*number);
+            }
+            ranges.push((start + lists.len()) as u32);
+        }
+        ranges.extend(lists);
+        (casting, ranges)
     }
 
     /// All rectangles, the farthest centre first: they are blended.
     fn rectangles_seen_along(&self, forward: Vec3) -> Vec<Rectangle> {
-        let rectangle = |(i, (baked, slot)): (usize, &(BakedPlane, Slot))| {
+        let planes = self.set.planes.iter().zip(&self.slots).enumerate();
+        let rectangle = |(i, (baked, slot)): (usize, (&BakedPlane, &Slot))| {
             Rectangle::new(&baked.plane, slot, plane_color_linear(i))
         };
-        let mut rectangles: Vec<_> = self.baked.iter().enumerate().map(rectangle).collect();
+        let mut rectangles: Vec<_> = planes.map(rectangle).collect();
         rectangles.sort_by(|p, q| q.centre().dot(forward).total_cmp(&p.centre().dot(forward)));
         rectangles
     }
+}
+
+/// Indices in all lists of a set, under the light where there are most.
+fn longest(set: &BakedSet) -> usize {
+    let active = set.active.iter().flat_map(|active| &active.lists);
+    active.chain([&set.sections]).map(|lists| lists.iter().map(Vec::len).sum()).max().unwrap_or(0)
 }
 
 /// Colour of plane `i`: the palette, darker each time it repeats.

@@ -102,6 +102,7 @@ fn triangle_vertices(scene: &Scene, frame: &Frame, triangle: usize) -> [Vertex; 
         shading_normal: finite_or(scene.normals[triangle][corner], geometric_normal),
         uv: scene.uvs[triangle][corner],
         material: scene.material_of[triangle],
+        section: scene.section_of[triangle],
     })
 }
 

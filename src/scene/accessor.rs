@@ -57,6 +57,7 @@ pub(super) struct Accessor<'a> {
     pub count: u64,
     component: ComponentType,
     width: usize,
+    size: usize,
     normalized: bool,
     base: Option<Strided<'a>>,
     sparse: Option<Sparse<'a>>,
@@ -88,18 +89,54 @@ impl Accessor<'_> {
         format!("/accessors/{}", self.index)
     }
 
-    /// The first `N` components of element `i`, or `None` past the end.
-    pub(super) fn get<const N: usize>(&self, i: u64) -> Option<[f64; N]> {
-        if i >= self.count || N > self.width {
+    /// Bytes of an element.
+    pub(super) fn element_size(&self) -> usize {
+        self.size
+    }
+
+    /// Are the components floating-point numbers?
+    pub(super) fn is_float(&self) -> bool {
+        self.component == ComponentType::F32
+    }
+
+    /// The bytes of element `i`; `None` past the end, and where no buffer view gives any (they are zeros).
+    pub(super) fn bytes(&self, i: u64) -> Option<&[u8]> {
+        if i >= self.count {
             return None;
         }
         let replaced = self.sparse.as_ref().and_then(|sparse| {
             let at = sparse.indices.binary_search(&i).ok()?;
             sparse.values.element(at as u64)
         });
-        let Some(bytes) = replaced.or_else(|| self.base.as_ref().and_then(|base| base.element(i))) else {
-            return Some([0.0; N]);
+        replaced.or_else(|| self.base.as_ref().and_then(|base| base.element(i)))?.get(..self.size)
+    }
+
+    /// Least and largest components of some elements, as stored: integers not normalised.
+    pub(super) fn bounds(&self, elements: &[u32]) -> Option<[[f64; 3]; 2]> {
+        let raw = |i: u32| {
+            let bytes = self.bytes(u64::from(i));
+            let component = |c: usize| match bytes {
+                Some(bytes) => decode(self.component, bytes.get(c * self.component.size()..)?, false),
+                None => Some(0.0),
+            };
+            Some([component(0)?, component(1)?, component(2)?])
         };
+        let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        for &i in elements {
+            for (c, x) in raw(i)?.into_iter().enumerate() {
+                bounds[0][c] = bounds[0][c].min(x);
+                bounds[1][c] = bounds[1][c].max(x);
+            }
+        }
+        Some(bounds)
+    }
+
+    /// The first `N` components of element `i`, or `None` past the end.
+    pub(super) fn get<const N: usize>(&self, i: u64) -> Option<[f64; N]> {
+        if i >= self.count || N > self.width {
+            return None;
+        }
+        let Some(bytes) = self.bytes(i) else { return Some([0.0; N]) };
         let mut element = [0.0; N];
         for (c, value) in element.iter_mut().enumerate() {
             *value = decode(self.component, bytes.get(c * self.component.size()..)?, self.normalized)?;
@@ -130,7 +167,7 @@ impl<'a> Data<'a> {
         }
         let width = kind.multiplicity();
         let component = component(&record.component_type, &format!("{pointer}/componentType"), usage)?;
-        let size = width * component.size();
+        let size = element_size(kind, component);
         let base = match record.buffer_view {
             Some(view) => Some(self.strided(&Range {
                 user: format!("{pointer}/bufferView"),
@@ -145,7 +182,7 @@ impl<'a> Data<'a> {
         };
         let sparse = record.sparse.as_ref().map(|s| self.sparse(s, &pointer, record.count, size)).transpose()?;
         let normalized = record.normalized && usage == Use::Number;
-        Ok(Accessor { index, count: record.count, component, width, normalized, base, sparse })
+        Ok(Accessor { index, count: record.count, component, width, size, normalized, base, sparse })
     }
 
     /// Opens the sparse part of the accessor at `pointer`, whose elements have `size` bytes.
@@ -280,6 +317,17 @@ struct Range {
     size: usize,
     /// Does the view's stride apply?
     strided: bool,
+}
+
+/// Bytes of an element; the columns of matrices start at multiples of four (glTF 2.0 specification, section 3.6.2.4).
+fn element_size(kind: Type, component: ComponentType) -> usize {
+    let (columns, rows) = match kind {
+        Type::Mat2 => (2, 2),
+        Type::Mat3 => (3, 3),
+        Type::Mat4 => (4, 4),
+        vector => return vector.multiplicity() * component.size(),
+    };
+    columns * (rows * component.size()).next_multiple_of(4)
 }
 
 /// The component type, if `usage` allows it.

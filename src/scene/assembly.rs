@@ -14,6 +14,7 @@ use super::{
     materials::Surfaces,
     nodes::{Hierarchy, placement},
     primitive::{Pose, Primitive, Transform},
+    sections::Sections,
 };
 use crate::gltf_file::GltfFile;
 use glam::{DAffine3, DMat3, DVec3};
@@ -57,6 +58,7 @@ pub(super) fn assemble(
     notices: &mut Notices,
 ) -> Result<Scene, Fault> {
     let mut surfaces = Surfaces::new(file, data);
+    let sections = Sections::new(file.root());
     let mut meshes: Vec<Option<Vec<Primitive<'_>>>> = Vec::new();
     meshes.resize_with(data.document.meshes.len(), || None);
     // First round: open and count.
@@ -64,7 +66,7 @@ pub(super) fn assemble(
     let (mut draws, mut triangles) = (0_u64, 0_u64);
     for place in &places {
         if meshes[place.mesh].is_none() {
-            meshes[place.mesh] = Some(open_mesh(data, place.mesh, &mut surfaces, notices)?);
+            meshes[place.mesh] = Some(open_mesh((data, &sections), place.mesh, &mut surfaces, notices)?);
         }
         let primitives = meshes[place.mesh].as_deref().unwrap_or_default();
         let copies = place.copies.as_ref().map_or(1, |copies| copies.count);
@@ -152,7 +154,7 @@ impl Copies<'_> {
 }
 
 fn open_mesh<'a>(
-    data: &Data<'a>,
+    (data, sections): (&Data<'a>, &Sections),
     mesh: usize,
     surfaces: &mut Surfaces<'_>,
     notices: &mut Notices,
@@ -160,7 +162,11 @@ fn open_mesh<'a>(
     let mut primitives = Vec::new();
     for (i, record) in data.document.meshes[mesh].primitives.iter().enumerate() {
         let pointer = format!("/meshes/{mesh}/primitives/{i}");
-        primitives.extend(Primitive::open(data, record, &pointer, surfaces, notices)?);
+        if let Some(mut primitive) = Primitive::open(data, record, &pointer, surfaces, notices)? {
+            primitive.index = [mesh as u32, i as u32];
+            primitive.label = sections.label(data, record, (&pointer, primitive.vertices()))?;
+            primitives.push(primitive);
+        }
     }
     Ok(primitives)
 }

@@ -4,6 +4,7 @@ use super::{
     Fault, Notices,
     document::{Document, Extensions},
 };
+use crate::gltf_file::EXTENSION;
 
 /// Extensions that this reader honours, or that change nothing about the triangles and the base colour.
 const KNOWN: [&str; 9] = [
@@ -15,7 +16,7 @@ const KNOWN: [&str; 9] = [
     "EXT_mesh_gpu_instancing",
     "KHR_xmp_json_ld",
     "KHR_animation_pointer",
-    "SHADOWFIT_node_shadow_planes",
+    EXTENSION,
 ];
 
 /// Extensions that only concern shading; all start like this.

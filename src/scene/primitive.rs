@@ -5,11 +5,12 @@
 //! repeats work for shared vertices, but needs no memory that the file could inflate.
 
 use super::{
-    Fault, Notices, Scene,
+    Fault, Notices, Origin, Scene,
     accessor::{Accessor, Data, Use},
     document,
     extensions::compression,
     materials::{Surface, Surfaces},
+    sections::Label,
 };
 use glam::{DAffine3, DMat3, DVec2, DVec3, Vec2, Vec3};
 use gltf::json::{accessor::Type, mesh::Mode};
@@ -27,6 +28,10 @@ pub(super) struct Primitive<'a> {
     pub triangles: u64,
     /// What they are made of.
     pub surface: Surface,
+    /// Index of the mesh, and of the primitive in it.
+    pub index: [u32; 2],
+    /// Sections of the triangles.
+    pub label: Label<'a>,
     positions: Accessor<'a>,
     normals: Option<Accessor<'a>>,
     uvs: Option<Accessor<'a>>,
@@ -81,6 +86,21 @@ impl Transform {
     }
 }
 
+/// The corners of triangle `t` in the list of corners; winding of strips and fans: glTF 2.0 specification, section
+/// 3.7.2.1.
+pub(super) fn corner_numbers(mode: Mode, t: u64) -> [u64; 3] {
+    match mode {
+        Mode::TriangleStrip => [t, t + 1 + t % 2, t + 2 - t % 2],
+        Mode::TriangleFan => [t + 1, t + 2, 0],
+        _ => [3 * t, 3 * t + 1, 3 * t + 2],
+    }
+}
+
+/// The number of triangles that so many corners make.
+pub(super) fn triangle_count(mode: Mode, corners: u64) -> u64 {
+    if mode == Mode::Triangles { corners / 3 } else { corners.saturating_sub(2) }
+}
+
 /// A corner in model space.
 struct Corner {
     position: DVec3,
@@ -129,7 +149,7 @@ impl<'a> Primitive<'a> {
         if corners < 3 {
             return Ok(skip(notices, "primitives with less than three corners", "no triangle to draw"));
         }
-        let triangles = if mode == Mode::Triangles { corners / 3 } else { corners - 2 };
+        let triangles = triangle_count(mode, corners);
         if mode == Mode::Triangles && corners % 3 != 0 {
             notices.add("incomplete triangles", 1, "the last corners of a primitive do not make three");
         }
@@ -148,7 +168,13 @@ impl<'a> Primitive<'a> {
         let normals = attributes.open("NORMAL", Type::Vec3, count)?;
         let targets = open_targets(data, record, pointer, count)?;
         let skinning = open_skinning(&attributes, count)?;
-        Ok(Some(Self { mode, triangles, surface, positions, normals, uvs, indices, targets, skinning }))
+        let (index, label) = ([0; 2], Label::default());
+        Ok(Some(Self { mode, triangles, surface, index, label, positions, normals, uvs, indices, targets, skinning }))
+    }
+
+    /// Number of vertices.
+    pub(super) fn vertices(&self) -> u64 {
+        self.positions.count
     }
 
     /// Does the primitive have morph targets?
@@ -167,26 +193,29 @@ impl<'a> Primitive<'a> {
             return Ok(());
         }
         for t in 0..self.triangles {
-            // The winding of strips and fans: glTF 2.0 specification, section 3.7.2.1.
-            let numbers = match self.mode {
-                Mode::TriangleStrip => [t, t + 1 + t % 2, t + 2 - t % 2],
-                Mode::TriangleFan => [t + 1, t + 2, 0],
-                _ => [3 * t, 3 * t + 1, 3 * t + 2],
-            };
+            let numbers = corner_numbers(self.mode, t);
             let [a, b, c] = numbers.map(|number| self.corner(number, pose, notices));
             let (a, b, c) = (a?, b?, c?);
             let mirrored = [&a, &b, &c].iter().filter(|corner| corner.is_mirrored).count();
             push(scene, &self.surface, if mirrored >= 2 { [a, c, b] } else { [a, b, c] });
+            let [mesh, primitive] = self.index;
+            scene.origins.push(Origin { mesh, primitive, triangle: t as u32 });
+            scene.section_of.push(self.label.section(numbers.map(|number| self.vertex(number)))?);
         }
         Ok(())
     }
 
-    /// Corner `number` of the list of corners, posed.
-    fn corner(&self, number: u64, pose: &Pose<'_>, notices: &mut Notices) -> Result<Corner, Fault> {
-        let vertex = match &self.indices {
+    /// The vertex of corner `number` of the list of corners.
+    fn vertex(&self, number: u64) -> u64 {
+        match &self.indices {
             Some(indices) => indices.get_index(number).unwrap_or(u64::MAX),
             None => number,
-        };
+        }
+    }
+
+    /// Corner `number` of the list of corners, posed.
+    fn corner(&self, number: u64, pose: &Pose<'_>, notices: &mut Notices) -> Result<Corner, Fault> {
+        let vertex = self.vertex(number);
         let Some(position) = self.positions.get::<3>(vertex) else {
             let pointer = self.indices.as_ref().map_or_else(|| self.positions.pointer(), Accessor::pointer);
             let reason = format!("index {vertex} at {number}, but there are {} vertices", self.positions.count);

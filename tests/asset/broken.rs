@@ -1,9 +1,10 @@
 //! Files with one thing wrong: each is refused with the place.
 
-use crate::fixtures::{Folders, document, glb, open, parse, planes, triangle};
+use crate::fixtures::{Folders, active_set, document, glb, open, parse, planes, request, triangle};
+use glam::Vec3;
 use serde_json::{Value, json};
-use shadowfit::asset::{AssetError, check_input, read, read_plane_file};
-use shadowfit_solver::plane::Side;
+use shadowfit::asset::{AssetError, check_input, read, read_plane_file, write};
+use shadowfit_solver::plane::{BakedSet, Encoding, Side};
 
 const SET: &str = "/extensions/SHADOWFIT_node_shadow_planes/sets/0";
 
@@ -21,12 +22,27 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
         ("planes/1/region", json!([-1, 0, 3, 3]), "planes/1/region"),
         ("planes/1/region", json!([0, 0, 2, 3]), "planes/1/region: the texture is 2 x 3"),
         ("planes/1/channel", json!("a"), "planes/1/channel: unknown variant `a`"),
-        ("planes/1/encoding", json!("sdf"), "planes/1/encoding: unknown variant `sdf`"),
+        ("planes/1/encoding", json!("msdf"), "planes/1/encoding: unknown variant `msdf`"),
         ("planes/1/side", json!("left"), "planes/1/side: unknown variant `left`"),
         ("planes/1/bias", json!(-1), "planes/1/bias"),
         ("planes", json!({}), "planes: not an array"),
         ("sections/0/1", json!(3), "sections/0/1: index 3 is out of range, there are 3"),
         ("sections/0/1", json!(-1), "sections/0/1"),
+        ("sections", json!([]), "sections: one section is needed"),
+        ("sections", json!(7), "sections: not an array"),
+        ("sections/0", json!({}), "sections/0: not an array"),
+        ("planes/0/region", json!([0, 0, 3, 3]), "planes/0/region: the outermost ring"),
+        ("active", json!([]), "active: not an object"),
+        ("active/lists", Value::Null, "active: the member \"lists\" is missing"),
+        ("active/directions", json!([]), "active/directions: one direction is needed"),
+        ("active/directions/1", json!([0, 0]), "active/directions/1"),
+        ("active/directions/1", json!([0, 0, 0]), "active/directions/1: of length 0, not 1"),
+        ("active/directions/1", json!([0, 1.01, 0]), "active/directions/1: of length 1.01, not 1"),
+        ("active/directions", json!([[0, 1, 0]]), "active/lists: 2 lists for 1 directions"),
+        ("active/lists/1", json!([[1], [1]]), "active/lists/1: 2 lists for 1 sections"),
+        ("active/lists/0/0/1", json!(3), "active/lists/0/0/1: plane 3 is not in the list of section 0"),
+        ("active/lists/0/0/1", json!(-3), "active/lists/0/0/1"),
+        ("active/lists/0/0", json!(3), "active/lists/0/0: not an array"),
         ("bounds/min", json!([9, 9, 9]), "bounds: min is above max"),
         ("bounds", Value::Null, "the member \"bounds\" is missing"),
     ]
@@ -53,7 +69,8 @@ fn refusal(path: &std::path::Path, expected: &str) {
 fn broken_extensions_name_the_place() {
     let folders = Folders::new();
     let input = folders.input("m.glb", &glb(&document("", ""), Some(&triangle())));
-    let written = folders.write(&input, &planes(3)).unwrap();
+    let (set, out) = (active_set(planes(3)), folders.out());
+    let written = write(&request(&input, &out, &set)).unwrap();
     let (json, bin) = open(&written.model);
     for (place, value, expected) in faults() {
         let mut broken = parse(&json);
@@ -146,6 +163,36 @@ fn planes_that_no_file_can_hold_are_refused() {
     let error = folders.write(&input, &bad).unwrap_err();
     assert_eq!((error.to_string().as_str(), error.exit_code()), ("shadow plane 0: origin: not a finite number", 4));
     assert!(folders.listing().is_empty());
+}
+
+#[test]
+fn lists_that_no_file_can_hold_are_refused() {
+    let folders = Folders::new();
+    let input = folders.input("m.glb", &glb(&document("", ""), Some(&triangle())));
+    let refused = |change: &dyn Fn(&mut BakedSet), expected: &str| {
+        let (mut set, out) = (active_set(planes(3)), folders.out());
+        change(&mut set);
+        let error = write(&request(&input, &out, &set)).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}\nshould contain {expected}");
+        assert_eq!((error.exit_code(), folders.listing().len()), (4, 0));
+    };
+    refused(&|set| set.sections.clear(), "sections: there is none");
+    refused(&|set| set.sections[0].push(3), "plane 3 in a list, but there are 3");
+    refused(&|set| set.active.as_mut().unwrap().directions.truncate(1), "1 directions with 2 lists");
+    refused(&|set| set.active.as_mut().unwrap().directions[0] = Vec3::ONE, "not of length 1");
+    refused(&|set| set.active.as_mut().unwrap().lists[1].clear(), "0 active lists for 1 sections");
+    refused(&|set| set.sections[0].truncate(2), "a plane that the section has not");
+    // The border of a distance field must not block.
+    refused(&|set| set.planes[1].texture.texels[0] = 1, "shadow plane 1: the outermost ring");
+    let field = |texel: u8| {
+        let mut set = active_set(planes(3));
+        set.planes[1].texture.encoding = Encoding::Sdf;
+        set.planes[1].texture.texels[0] = texel;
+        write(&request(&input, &folders.out(), &set))
+    };
+    assert!(field(128).unwrap_err().to_string().contains("shadow plane 1: the outermost ring"));
+    let back = read(&field(127).unwrap().sidecar).unwrap();
+    assert_eq!((back.planes[1].texture.encoding, back.planes[1].texture.texels[0]), (Encoding::Sdf, 127));
 }
 
 #[test]

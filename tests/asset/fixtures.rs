@@ -8,7 +8,7 @@ use shadowfit::{
 };
 use shadowfit_solver::{
     mesh::Frame,
-    plane::{BakedPlane, OccluderTexture, ShadowPlane, Side},
+    plane::{ActiveLists, BakedPlane, BakedSet, Encoding, OccluderTexture, ShadowPlane, Side},
 };
 use std::path::{Path, PathBuf};
 
@@ -54,13 +54,13 @@ impl Numbers {
 
 /// A texture with an open ring and noise inside.
 pub fn texture(width: usize, height: usize, numbers: &mut Numbers) -> OccluderTexture {
-    let mut coverage = vec![0; width * height];
+    let mut texels = vec![0; width * height];
     for y in 1..height - 1 {
         for x in 1..width - 1 {
-            coverage[y * width + x] = numbers.below(256) as u8;
+            texels[y * width + x] = numbers.below(256) as u8;
         }
     }
-    OccluderTexture { width, height, coverage }
+    OccluderTexture { width, height, encoding: Encoding::Coverage, texels }
 }
 
 pub fn planes(count: usize) -> Vec<BakedPlane> {
@@ -116,7 +116,20 @@ impl Folders {
 }
 
 pub fn write_to(input: &Path, out_dir: &Path, planes: &[BakedPlane]) -> Result<Written, AssetError> {
-    write(&AssetRequest { input, out_dir, stem: "m", frame: &FRAME, bounds: BOUNDS, planes })
+    let set = BakedSet::one_section(planes.to_vec());
+    write(&request(input, out_dir, &set))
+}
+
+/// One section with active lists of two directions.
+pub fn active_set(planes: Vec<BakedPlane>) -> BakedSet {
+    let directions = vec![Vec3::new(0.1, 0.7, -0.3).normalize(), Vec3::new(-0.2, -0.4, 0.9).normalize()];
+    let lists = vec![vec![vec![0, 2]], vec![vec![1]]];
+    BakedSet { active: Some(ActiveLists { directions, lists }), ..BakedSet::one_section(planes) }
+}
+
+/// A request without labels.
+pub fn request<'a>(input: &'a Path, out_dir: &'a Path, set: &'a BakedSet) -> AssetRequest<'a> {
+    AssetRequest { input, out_dir, stem: "m", frame: &FRAME, bounds: BOUNDS, set, origins: &[], section_of: &[] }
 }
 
 /// JSON text and binary chunk of a GLB file.

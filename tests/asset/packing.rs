@@ -2,6 +2,7 @@
 
 use crate::fixtures::{Numbers, texture};
 use shadowfit::asset::atlas::{self, Layout, pack};
+use shadowfit_solver::plane::{Encoding, OccluderTexture};
 
 fn assert_disjoint(sizes: &[[u32; 2]], layout: &Layout) {
     assert_eq!(layout.placements.len(), sizes.len());
@@ -50,6 +51,44 @@ fn large_sets_use_several_atlases() {
     assert!(layout.atlases.iter().flatten().all(|&side| side <= atlas::MAX_SIDE_PX));
 }
 
+/// Hundreds of small textures, as sections have them: the rest of a row hardly counts.
+#[test]
+fn many_small_textures_fill_the_atlas() {
+    let mut numbers = Numbers(11);
+    for count in [300, 2000] {
+        let sizes: Vec<[u32; 2]> =
+            (0..count).map(|_| [10 + numbers.below(51) as u32, 10 + numbers.below(51) as u32]).collect();
+        let start = std::time::Instant::now();
+        let layout = pack(&sizes).unwrap();
+        let seconds = start.elapsed().as_secs_f64();
+        assert_disjoint(&sizes, &layout);
+        let texels: u64 = sizes.iter().map(|[w, h]| u64::from(w * h)).sum();
+        let fill = texels as f64 / layout.texture_bytes() as f64;
+        println!("{count} textures: {:?}, {:.1} % full, {seconds:.3} s", layout.atlases, 100.0 * fill);
+        assert!(fill >= 0.9, "{count} textures: {fill}");
+    }
+}
+
+#[test]
+fn equal_textures_share_a_region() {
+    let mut numbers = Numbers(5);
+    let (a, b) = (texture(20, 9, &mut numbers), texture(5, 30, &mut numbers));
+    let mut field = a.clone();
+    field.encoding = Encoding::Sdf;
+    field.texels.iter_mut().for_each(|texel| *texel /= 3);
+    // The same bytes read in another way, and the same bytes in another shape, are other textures.
+    let mut flat = field.clone();
+    flat.encoding = Encoding::Coverage;
+    let wide = OccluderTexture { width: 30, height: 5, encoding: Encoding::Coverage, texels: vec![0; 150] };
+    let tall = OccluderTexture { width: 5, height: 30, ..wide.clone() };
+    let list = [&a, &b, &a.clone(), &field, &flat, &b, &wide, &tall, &wide];
+    let (layout, atlases) = atlas::build(&list).unwrap();
+    let place = &layout.placements;
+    assert_eq!([place[2], place[5], place[8]], [place[0], place[1], place[6]]);
+    let places: std::collections::BTreeSet<_> = place.iter().map(|p| (p.atlas, p.channel as usize, p.x, p.y)).collect();
+    assert_eq!((places.len(), atlases.len()), (6, 1));
+}
+
 #[test]
 fn atlases_are_plain_rgb_png_files() {
     let mut numbers = Numbers(3);
@@ -75,14 +114,14 @@ fn textures_that_would_bleed_or_break_are_refused() {
     let good = texture(8, 6, &mut numbers);
     for (i, at) in [(0, "(0, 0)"), (7, "(7, 0)"), (40, "(0, 5)"), (23, "(7, 2)")] {
         let mut bad = good.clone();
-        bad.coverage[i] = 1;
+        bad.texels[i] = 1;
         let error = atlas::build(&[&good, &bad]).unwrap_err();
         assert!(error.to_string().contains("shadow plane 1") && error.to_string().contains(at), "{error}");
         assert_eq!(error.exit_code(), 4);
     }
     let mut short = good.clone();
-    short.coverage.pop();
+    short.texels.pop();
     assert!(atlas::build(&[&short]).is_err());
-    let thin = shadowfit_solver::plane::OccluderTexture { width: 2, height: 5, coverage: vec![0; 10] };
+    let thin = OccluderTexture { width: 2, height: 5, encoding: Encoding::Coverage, texels: vec![0; 10] };
     assert!(atlas::build(&[&thin]).is_err());
 }

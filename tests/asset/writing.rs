@@ -1,8 +1,9 @@
 //! Files on the disk: external buffers, refusals, nothing left behind.
 
-use crate::fixtures::{Folders, document, glb, open, parse, planes, triangle, write_to};
+use crate::fixtures::{Folders, document, glb, open, parse, planes, request, triangle, write_to};
 use serde_json::json;
-use shadowfit::asset::{AssetError, check_input, read};
+use shadowfit::asset::{AssetError, AssetRequest, check_input, read};
+use shadowfit_solver::plane::BakedSet;
 use std::fs;
 
 const EXTERNAL: &str = r#""uri":"sub%20folder/m.bin","#;
@@ -54,20 +55,13 @@ fn data_uris_stay_and_names_are_encoded() {
     let folders = Folders::new();
     let uri = r#""uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA","#;
     let input = folders.input("m.gltf", document(uri, "").as_bytes());
-    let planes = planes(2);
-    let request = shadowfit::asset::AssetRequest {
-        input: &input,
-        out_dir: &folders.out(),
-        stem: "é 100%",
-        frame: &crate::fixtures::FRAME,
-        bounds: crate::fixtures::BOUNDS,
-        planes: &planes,
-    };
+    let (set, out) = (BakedSet::one_section(planes(2)), folders.out());
+    let request = AssetRequest { stem: "é 100%", ..request(&input, &out, &set) };
     let written = shadowfit::asset::write(&request).unwrap();
     assert_eq!(folders.listing(), ["é 100%.atlas-0.png", "é 100%.shadow.glb", "é 100%.shadow.json"]);
     assert_eq!(read(&written.sidecar).unwrap(), read(&written.model).unwrap());
     for stem in ["", ".", "..", "a/b", "a\\b"] {
-        let error = shadowfit::asset::write(&shadowfit::asset::AssetRequest { stem, ..request }).unwrap_err();
+        let error = shadowfit::asset::write(&AssetRequest { stem, ..request }).unwrap_err();
         assert!(matches!(error, AssetError::Stem { .. }), "{error}");
     }
 }

@@ -1,8 +1,18 @@
 //! `render`, and machines without a graphics adapter.
 
 use crate::program::{Outcome, model, outcome, program, run, small_asset};
+use glam::DVec3;
 use image::RgbaImage;
-use std::{collections::BTreeSet, path::Path, process::Command};
+use shadowfit::{
+    asset::{self, AssetRequest},
+    scene,
+};
+use shadowfit_solver::{mesh::Mesh, plane::BakedSet};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+    process::Command,
+};
 
 const SIZE_PX: u32 = 96;
 
@@ -78,6 +88,36 @@ fn light_in_the_plane_or_below_the_horizon_draws_no_nonsense() {
         let facing_and_dark = share(&mask, |[r, g, ..]| g == 255 && r < 255);
         assert_eq!(facing_and_dark, 0.0, "{light}");
     }
+}
+
+/// An asset of two sections: the plate, and the ground, which reads the planes only where `ground_reads`.
+fn two_sections(fitted: &Path, ground_reads: &[u32]) -> PathBuf {
+    let input = model("plate_over_ground");
+    let scene = scene::load(&input).unwrap();
+    let frame = Mesh::new(&scene.soup).unwrap().frame;
+    let (found, out) = (asset::read(fitted).unwrap(), fitted.with_file_name(format!("{}-planes", ground_reads.len())));
+    let set = BakedSet { sections: vec![vec![], ground_reads.to_vec()], ..found.in_unit_space(&frame) };
+    let low = |corners: &[DVec3; 3]| corners.iter().all(|corner| corner.y < frame.centre_model.y);
+    let section_of: Vec<u32> = scene.soup.corners_model.iter().map(|corners| u32::from(low(corners))).collect();
+    assert!(section_of.contains(&0) && section_of.contains(&1));
+    let bounds = found.bounds;
+    let (origins, section_of) = (&scene.origins, &section_of);
+    let request =
+        AssetRequest { input: &input, out_dir: &out, stem: "m", frame: &frame, bounds, set: &set, origins, section_of };
+    asset::write(&request).unwrap().model
+}
+
+#[test]
+fn sections_are_drawn_with_their_own_planes() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = ["--light", "-30,60", "--view", "20,35"];
+    let mask = |asset: &Path| picture(asset, &[&["--mode", "mask"], &words[..]].concat());
+    let fitted = small_asset(folder.path());
+    let [with, without] = [&[0][..], &[]].map(|reads| mask(&two_sections(&fitted, reads)));
+    let one = mask(&fitted);
+    assert_eq!(difference(&one, &with), 0.0, "the plate itself has no shadow");
+    assert!(share(&with, |[r, g, ..]| g == 255 && r < 128) > 0.003);
+    assert_eq!(share(&without, |[r, g, ..]| g == 255 && r < 255), 0.0);
 }
 
 /// The program on a machine where wgpu finds nothing: no Vulkan driver, and no other interface looked at.

@@ -6,7 +6,7 @@ use shadowfit_solver::{
     lights::LightDomain,
     mesh::{Mesh, Sides, Soup},
     metrics::measure,
-    plane::{BakedPlane, OccluderTexture, ShadowPlane, Side},
+    plane::{BakedPlane, BakedSet, Encoding, OccluderTexture, ShadowPlane, Side},
     receivers::{ReceiverOptions, sample},
     visibility::trace,
 };
@@ -77,14 +77,15 @@ fn lights_exactly_in_a_plane_neither_shadow_nor_break() {
     let corner = |p: DVec3| mesh.frame.unit_from_model(p);
     let [origin, along_u, along_v] = [[-1.0, 0.0], [1.0, 0.0], [-1.0, 2.0]].map(|[x, y]| corner(DVec3::new(x, y, 0.0)));
     let plane = ShadowPlane { origin, u: along_u - origin, v: along_v - origin };
-    let texture = OccluderTexture { width: 8, height: 8, coverage: vec![255; 64] };
+    let texture = OccluderTexture { width: 8, height: 8, encoding: Encoding::Coverage, texels: vec![255; 64] };
     let lights = [[0.0, 1.0], [1.0, 0.0], [0.6, 0.8], [-0.8, 0.6], [-0.6, -0.8], [0.0, -1.0]]
         .map(|[x, y]| Vec3::new(x, y, 0.0).normalize());
     let pairs = trace(&mesh, &receivers, &lights, 1.0);
     assert!(pairs.lights.iter().any(|light| !light.is_empty()), "nothing is lit");
     for side in [Side::Both, Side::Front, Side::Back] {
         let baked = BakedPlane { plane, texture: texture.clone(), side, bias: 0.0 };
-        let [with, without] = [measure(&[baked], &pairs), measure(&[], &pairs)];
+        let measured = |planes| measure(&BakedSet::one_section(planes), &pairs, &vec![0; pairs.receivers]);
+        let [with, without] = [measured(vec![baked]), measured(vec![])];
         assert!(with.shadow_error.is_finite() && with.false_ == 0.0, "{with:?}");
         assert_eq!(with, without, "an edge-on plane casts nothing");
     }

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec2, Vec3};
 use shadowfit::scene::{Material, Scene};
 use shadowfit_solver::{
     mesh::{Cutout, Sides},
-    plane::{BakedPlane, OccluderTexture, ShadowPlane, Side},
+    plane::{BakedPlane, Encoding, OccluderTexture, ShadowPlane, Side},
 };
 use std::{f32::consts::TAU, sync::Arc};
 
@@ -75,16 +75,16 @@ fn blobs(random: &mut Random, width: usize, height: usize) -> OccluderTexture {
     let blobs: Vec<(Vec2, f32)> = (0..6)
         .map(|_| (Vec2::new(random.between(0.2, 0.8), random.between(0.2, 0.8)), random.between(0.06, 0.18)))
         .collect();
-    let mut coverage = vec![0; width * height];
+    let mut texels = vec![0; width * height];
     for y in 1..height - 1 {
         for x in 1..width - 1 {
             let ab = Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
             let distance = blobs.iter().map(|(centre, r)| ab.distance(*centre) - r).fold(f32::MAX, f32::min);
             let edge = (0.5 - distance / 0.05).clamp(0.0, 1.0);
-            coverage[y * width + x] = (255.0 * edge * edge * (3.0 - 2.0 * edge)).round() as u8;
+            texels[y * width + x] = (255.0 * edge * edge * (3.0 - 2.0 * edge)).round() as u8;
         }
     }
-    OccluderTexture { width, height, coverage }
+    OccluderTexture { width, height, encoding: Encoding::Coverage, texels }
 }
 
 /// A small generator (Numerical Recipes' 64-bit LCG): the test draws the same planes forever.
@@ -139,6 +139,7 @@ fn push(
     scene.normals.push(normals);
     scene.uvs.push(uvs);
     scene.material_of.push(material);
+    scene.section_of.push(0);
 }
 
 fn model(p: Vec3) -> DVec3 {

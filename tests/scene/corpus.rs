@@ -79,7 +79,8 @@ fn consistent(scene: &Scene) -> Result<(), String> {
     let soup = &scene.soup;
     let lengths = [soup.sides.len(), soup.cutout.len(), soup.cutout_uv.len(), scene.normals.len(), scene.uvs.len()];
     let count = soup.corners_model.len();
-    if lengths.iter().chain([&scene.material_of.len()]).any(|length| *length != count) {
+    let more = [scene.material_of.len(), scene.origins.len(), scene.section_of.len()];
+    if lengths.iter().chain(&more).any(|length| *length != count) {
         return Err(format!("lists of {lengths:?} for {count} triangles"));
     }
     if scene.normals.iter().flatten().any(|normal| (normal.length() - 1.0).abs() > 1e-4) {

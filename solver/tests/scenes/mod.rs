@@ -7,7 +7,8 @@ use shadowfit_solver::{
     candidates::{CandidateOptions, generate},
     lights::LightDomain,
     mesh::{Mesh, Sides, Soup},
-    plane::BakedPlane,
+    metrics::{Metrics, measure},
+    plane::{BakedPlane, BakedSet},
     receivers::{ReceiverOptions, Receivers, sample},
     rectangle::Turn,
     sampling::uniform,
@@ -73,6 +74,11 @@ pub fn fit(mesh: &Mesh, pairs: &Pairs, options: &FitOptions) -> (Selection, Vec<
     let selection = select(mesh, pairs, &candidates, &options.selection, &mut |_| Verdict::Continue);
     let baked = bake(pairs, &selection.planes, &options.bake);
     (selection, baked)
+}
+
+/// The error of planes that every receiver reads.
+pub fn measured(planes: &[BakedPlane], pairs: &Pairs) -> Metrics {
+    measure(&BakedSet::one_section(planes.to_vec()), pairs, &vec![0; pairs.receivers])
 }
 
 /// A soup without cut-outs.
