@@ -5,12 +5,16 @@
 
 pub mod bake;
 pub mod candidates;
+pub mod certificate;
+pub mod columns;
 pub mod lights;
 pub mod mesh;
 pub mod metrics;
 pub mod plane;
+pub mod pool;
 pub mod receivers;
 pub mod rectangle;
+pub mod relaxation;
 pub mod sampling;
 pub mod selection;
 pub mod shade;

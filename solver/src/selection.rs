@@ -333,7 +333,7 @@ impl Search<'_> {
 }
 
 /// The best `count` planes no two of which are nearly the same.
-fn distinct(mut scored: Vec<(f64, ShadowPlane)>, count: usize) -> Vec<(f64, ShadowPlane)> {
+pub(crate) fn distinct(mut scored: Vec<(f64, ShadowPlane)>, count: usize) -> Vec<(f64, ShadowPlane)> {
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut kept: Vec<(f64, ShadowPlane)> = Vec::new();
     for (gain, plane) in scored {
@@ -350,7 +350,7 @@ fn distinct(mut scored: Vec<(f64, ShadowPlane)>, count: usize) -> Vec<(f64, Shad
 }
 
 /// The rectangle turned about its middle, around its v or u edge, or moved along its normal.
-fn shifted(plane: &ShadowPlane, direction: usize, tilt: f32) -> ShadowPlane {
+pub(crate) fn shifted(plane: &ShadowPlane, direction: usize, tilt: f32) -> ShadowPlane {
     let middle = plane.origin + 0.5 * (plane.u + plane.v);
     let (axis, shift) = match direction {
         0 => (plane.u, Vec3::ZERO),
