@@ -10,7 +10,7 @@ use crate::{
 };
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use shadowfit_solver::{lights::direction, mesh::Mesh};
+use shadowfit_solver::{columns::ColumnOptions, lights::direction, mesh::Mesh};
 use std::{io::IsTerminal, path::PathBuf, time::Duration};
 
 /// Finds shadow planes through a 3D model and bakes occluder textures on them: self-shadows for any light in one
@@ -58,6 +58,9 @@ struct FitArgs {
     /// Frames to render and compare: none, short (4 views x 2 lights, 512 px) or full (8 x 8, 1024 px).
     #[arg(long, value_enum, default_value_t = Validate::Short)]
     validate: Validate,
+    /// Prove how far from the best planes of a pool the ones found are (half a minute more).
+    #[arg(long)]
+    certificate: bool,
     /// Seed of all sampling: the same seed gives the same bytes.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
@@ -199,6 +202,7 @@ fn fit(args: FitArgs, command: String) -> Result<(), CliError> {
             Validate::Short => Some(ValidationOptions::short()),
             Validate::Full => Some(ValidationOptions::full()),
         },
+        certificate: args.certificate.then(ColumnOptions::default),
         seed: args.seed,
         command,
     };

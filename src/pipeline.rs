@@ -12,6 +12,8 @@ use glam::{DVec3, Vec3};
 use shadowfit_solver::{
     bake::{BakeOptions, bake},
     candidates::{CandidateOptions, generate},
+    certificate::Certificate,
+    columns::{ColumnOptions, certify_found},
     lights::LightDomain,
     mesh::{Mesh, MeshError},
     metrics::{Metrics, measure},
@@ -80,6 +82,8 @@ pub struct FitRequest {
     pub planes: Option<PathBuf>,
     /// Frames to render; none without.
     pub validation: Option<ValidationOptions>,
+    /// Prove a bound; none without.
+    pub certificate: Option<ColumnOptions>,
     /// Seed of all sampling.
     pub seed: u64,
     /// The command line, for the report.
@@ -140,6 +144,8 @@ impl Clock {
 /// What the search and the bake leave behind.
 struct Fitted {
     planes: Vec<BakedPlane>,
+    /// The planes as searched: what a certificate is about.
+    searched: Vec<Mask>,
     /// The greedy phase's planes, baked in order: the first k are its answer for k planes.
     greedy: Vec<BakedPlane>,
     /// Seconds into the search at which each greedy plane was found.
@@ -169,16 +175,16 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
     time_s.reference = clock.lap();
 
     let fitted = fit(request, &mesh, &pairs, progress, (&mut clock, &mut time_s))?;
+    let certificate = certify(request, (&mesh, &pairs), &fitted.searched, progress, (&mut clock, &mut time_s));
 
     progress("writing the asset".to_string());
-    let stem = stem_of(&request.model);
-    let (out_dir, bounds) = (request.out_dir.as_path(), receiver_bounds(&mesh, &receivers));
+    let (stem, out_dir) = (stem_of(&request.model), request.out_dir.as_path());
     let asset_request = AssetRequest {
         input: &request.model,
         out_dir,
         stem: &stem,
         frame: &mesh.frame,
-        bounds,
+        bounds: receiver_bounds(&mesh, &receivers),
         planes: &fitted.planes,
     };
     let written = asset::write(&asset_request)?;
@@ -205,7 +211,7 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
         held_out: proof.held_out,
         training: measure(&fitted.planes, &pairs),
         image: proof.image,
-        certificate: None,
+        certificate,
         curve: proof.curve,
         time_s,
         peak_memory_bytes: peak_memory_bytes(),
@@ -277,7 +283,7 @@ fn fit(
         time_s.search = clock.lap();
         let planes = bake(pairs, &by_hand, &BakeOptions { turn: Turn::Fixed, ..options });
         time_s.bake = clock.lap();
-        return Ok(Fitted { planes, greedy: Vec::new(), found_at_s: Vec::new() });
+        return Ok(Fitted { planes, searched: by_hand, greedy: Vec::new(), found_at_s: Vec::new() });
     }
     let selection = selection_options(request);
     let candidates = generate(mesh, &CandidateOptions { seed: request.seed, ..request.effort.candidates });
@@ -300,7 +306,23 @@ fn fit(
     let planes = bake(pairs, &selected.planes, &options);
     let greedy = bake(pairs, &selected.greedy, &BakeOptions { rounds: 1, ..options });
     time_s.bake = clock.lap();
-    Ok(Fitted { planes, greedy, found_at_s })
+    Ok(Fitted { planes, searched: selected.planes, greedy, found_at_s })
+}
+
+/// Where asked for: how far from the best planes of a pool the ones found are.
+fn certify(
+    request: &FitRequest,
+    scene: (&Mesh, &Pairs),
+    planes: &[Mask],
+    progress: &mut dyn FnMut(String),
+    (clock, time_s): (&mut Clock, &mut Times),
+) -> Option<Certificate> {
+    let options = request.certificate.as_ref()?;
+    progress("proving a bound".to_string());
+    let candidates = generate(scene.0, &CandidateOptions { seed: request.seed, ..request.effort.candidates });
+    let certificate = certify_found(scene, planes, &candidates, &request.effort.selection, options);
+    time_s.certificate = clock.lap();
+    Some(certificate)
 }
 
 /// The preset's options with the user's numbers.

@@ -2,7 +2,7 @@
 
 use crate::{scene::Skipped, validation::ImageErrors};
 use serde::Serialize;
-use shadowfit_solver::metrics::Metrics;
+use shadowfit_solver::{certificate::Certificate, metrics::Metrics};
 use std::fmt;
 
 /// Version of the JSON layout; a change that breaks readers raises the number.
@@ -37,8 +37,8 @@ pub struct Report {
     pub training: Metrics,
     /// Errors of rendered frames; `null` with `--validate none`.
     pub image: Option<ImageErrors>,
-    /// Proven bound; `null`: not computed by this version.
-    pub certificate: Option<()>,
+    /// Proven bound on the training error of a sample; `null` without `--certificate`.
+    pub certificate: Option<Certificate>,
     /// Held-out error after each plane of the greedy phase; the last point is the result itself.
     pub curve: Vec<CurvePoint>,
     /// Seconds per stage.
@@ -95,6 +95,8 @@ pub struct Times {
     pub search: f64,
     /// Baking textures.
     pub bake: f64,
+    /// Proving the bound.
+    pub certificate: f64,
     /// Writing files.
     pub write: f64,
     /// Reading them back, held-out errors, frames.
@@ -125,6 +127,11 @@ impl fmt::Display for Report {
             line("shadow_error", format!("{error:.4} held out = {missed:.4} missed + {false_:.4} false"))?;
             let [x, y, z] = held.worst_light.direction;
             line("worst light", format!("{:.4} from ({x:.3}, {y:.3}, {z:.3})", held.worst_light.max))?;
+        }
+        if let Some(c) = &self.certificate {
+            let (found, bound, gap) = (c.found, c.lower_bound, c.gap);
+            let about = format!("{} planes of a pool of {}, {} training pairs", c.planes, c.pool, c.pairs);
+            line("certificate", format!("{found:.4} found, {bound:.4} proven bound, gap {gap:.4} ({about})"))?;
         }
         match &self.image {
             None => line("image", "not validated".to_string())?,
