@@ -64,7 +64,9 @@ fn tiny(seed: u64, planes: usize) -> (Pairs, Vec<PoolPlane>) {
             let p = unit_vector(300 + seed, i) * (0.3 + 0.7 * uniform(400 + seed, i) as f32);
             let weight = 0.5 + uniform(500 + seed, i) as f32;
             let blocked = hit(p, light) != (uniform(600 + seed, noise) < NOISE);
-            (out.x.push(p.x), out.y.push(p.y), out.z.push(p.z));
+            out.x.push(p.x);
+            out.y.push(p.y);
+            out.z.push(p.z);
             out.receiver.push(i as u32);
             out.vote.push(if blocked { weight } else { -weight });
         }
@@ -153,7 +155,7 @@ fn best_textures(votes: &[f64], chosen: &[&Vec<Option<usize>>], limit: f64) -> O
                 }
             }
         }
-        let solution = problem.solve().unwrap().into_solution().unwrap();
+        let solution = problem.solve().expect("feasible: all open").into_solution().expect("no limit is set");
         assert_eq!(solution.status(), SolutionStatus::Optimal);
         fixed + solution.objective()
     };
