@@ -21,7 +21,7 @@ pub struct CertificateOptions {
     /// At most this many iterations, 1 and up; every bound on the way is valid, the best is kept. The cost of one
     /// grows with pairs x planes.
     pub iterations: usize,
-    /// Stop when [`CHECK_EVERY`] iterations raise the bound by less than this share of it; 0 never stops early.
+    /// Stop when 20 iterations raise the bound by less than this share of it; 0 never stops early.
     pub settled: f64,
     /// Rounds of re-baking of the found planes, 1 and up; they end by themselves when nothing changes.
     pub rebake_rounds: usize,
