@@ -10,7 +10,7 @@ use crate::{
 };
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use shadowfit_solver::{lights::direction, mesh::Mesh};
+use shadowfit_solver::{columns::ColumnOptions, lights::direction, mesh::Mesh};
 use std::{io::IsTerminal, path::PathBuf, time::Duration};
 
 /// Finds shadow planes through a 3D model and bakes occluder textures on them: self-shadows for any light in one
@@ -37,14 +37,24 @@ struct FitArgs {
     /// Folder of the output; made where it is missing.
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
-    /// Most planes [default: 12; with --max-error: 64].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=200))]
+    /// Most planes [default: 12 of a whole model, with --max-error 64; of a divided one as many as pay].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=20_000))]
     max_planes: Option<u16>,
+    /// Most planes that a fragment reads under any light [default: 4; with --max-planes alone: all].
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u16).range(1..=64))]
+    max_lookups: Option<u16>,
+    /// Sections that the surface is divided into [default: 1 where a few planes explain all shadow or --max-planes is
+    /// given alone; else by preset, 48 (fast), 96 or 160 (best)].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    sections: Option<u16>,
+    /// Most bytes of all occluder textures; K, M for KiB, MiB [default: 2M].
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    texture_budget: Option<usize>,
     /// Find the fewest planes whose held-out shadow_error is at most this; exit code 6 where that fails.
-    #[arg(long, value_name = "E", value_parser = error_share)]
+    #[arg(long, value_name = "E", value_parser = error_share, conflicts_with_all = ["sections", "max_lookups"])]
     max_error: Option<f64>,
-    /// Texels along the longer side of each plane [default: by preset, 128 (fast) or 256].
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(8..=2048))]
+    /// Texels along the longer side of each plane [default: 128].
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(8..=255))]
     texture_size: Option<u16>,
     /// Light directions to serve: sphere, hemisphere, or cone:AZIMUTH,ELEVATION,HALF_ANGLE in degrees.
     #[arg(long, value_name = "DOMAIN", default_value = "sphere")]
@@ -53,11 +63,14 @@ struct FitArgs {
     #[arg(long, value_enum, default_value_t = Preset::Balanced)]
     preset: Preset,
     /// Bake the rectangles of this JSON file instead of searching.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["max_planes", "max_error"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["max_planes", "max_error", "sections"])]
     planes: Option<PathBuf>,
     /// Frames to render and compare: none, short (4 views x 2 lights, 512 px) or full (8 x 8, 1024 px).
     #[arg(long, value_enum, default_value_t = Validate::Short)]
     validate: Validate,
+    /// Prove how far from the best planes of a pool the ones found are (half a minute more).
+    #[arg(long)]
+    certificate: bool,
     /// Seed of all sampling: the same seed gives the same bytes.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
@@ -152,6 +165,17 @@ fn error_share(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A number of bytes, with K or M for KiB or MiB.
+fn bytes(text: &str) -> Result<usize, String> {
+    let (digits, unit) = match text.char_indices().last() {
+        Some((at, 'K' | 'k')) => (&text[..at], 1 << 10),
+        Some((at, 'M' | 'm')) => (&text[..at], 1 << 20),
+        _ => (text, 1),
+    };
+    let number = digits.parse::<usize>().ok().and_then(|n| n.checked_mul(unit)).filter(|n| *n > 0);
+    number.ok_or_else(|| "a number of bytes is needed, or one with K or M".to_string())
+}
+
 /// `AZ,EL` in degrees, as radians.
 fn angles(text: &str) -> Result<[f32; 2], String> {
     let numbers: Vec<f32> = text.split(',').filter_map(|n| n.trim().parse().ok()).collect();
@@ -189,6 +213,9 @@ fn fit(args: FitArgs, command: String) -> Result<(), CliError> {
             Preset::Best => Effort::best(),
         },
         max_planes: args.max_planes.map(usize::from),
+        max_lookups: args.max_lookups.map(usize::from),
+        sections: args.sections.map(usize::from),
+        texture_budget: args.texture_budget,
         max_error: args.max_error,
         texture_size: args.texture_size.map(usize::from),
         domain,
@@ -199,6 +226,7 @@ fn fit(args: FitArgs, command: String) -> Result<(), CliError> {
             Validate::Short => Some(ValidationOptions::short()),
             Validate::Full => Some(ValidationOptions::full()),
         },
+        certificate: args.certificate.then(ColumnOptions::default),
         seed: args.seed,
         command,
     };

@@ -1,83 +1,154 @@
 //! Presets: how much work a fit does.
 
-use shadowfit_solver::{candidates::CandidateOptions, selection::SelectionOptions};
+use shadowfit_solver::{
+    budget::BudgetOptions, lists::ListOptions, pair_table::SampleSize, search::SearchOptions, sections::TraceOptions,
+};
 
 /// How much work a fit does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
-    /// Receivers that decide planes and textures.
-    pub receivers: usize,
-    /// Light directions that decide planes and textures; memory is about 10 bytes x receivers x lights.
-    pub lights: usize,
-    /// Where the search starts.
-    pub candidates: CandidateOptions,
-    /// How it goes on.
-    pub selection: SelectionOptions,
-    /// Texels along the longer side of each plane, where the user names none.
-    pub texture_size: usize,
+    /// Where the whole model is one section.
+    pub whole: Plan,
+    /// Where it is divided.
+    pub divided: Plan,
 }
 
+/// All numbers of a fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Sections, 1 and up; every section must be able to pay for a plane.
+    pub sections: usize,
+    /// What decides planes and textures.
+    pub trace: TraceOptions,
+    /// Directions of the active lists; each is chosen by the lights nearest to it, five and more.
+    pub directions: usize,
+    /// How planes are searched in each section.
+    pub search: SearchOptions,
+    /// Share of all shadow that a plane must explain to be taken. Counted under lights that did not decide its texture.
+    pub min_gain: f64,
+    /// How textures and lists are decided in turn.
+    pub lists: ListOptions,
+    /// What the textures may cost.
+    pub budget: BudgetOptions,
+}
+
+/// Bytes of all textures where the user names none.
+const TEXTURE_BUDGET: usize = 2 << 20;
+
 impl Effort {
-    /// A first look: about five seconds for a model of some thousand triangles on two cores.
+    /// A first look.
     #[must_use]
     pub fn fast() -> Self {
-        let base = Self::balanced();
+        let Self { whole, divided } = Self::balanced();
         Self {
-            receivers: 24_576,
-            lights: 160,
-            selection: SelectionOptions {
-                texels: 64,
-                scoring_pairs: [60_000, 120_000],
-                screening_pairs: 30_000,
-                finalists: 48,
-                refined: 3,
-                replace_rounds: 0,
-                ..base.selection
+            whole: Plan {
+                trace: TraceOptions { pairs: 2_000_000, ..whole.trace },
+                search: SearchOptions {
+                    proposals: 400,
+                    finalists: 12,
+                    scoring: SampleSize { lights: 128, pairs: 60_000 },
+                    texels: 64,
+                    replace_rounds: 0,
+                    ..whole.search
+                },
+                ..whole
             },
-            texture_size: 128,
-            ..base
+            divided: Plan {
+                sections: 48,
+                trace: TraceOptions { pairs: 4_000_000, lights: 1024, ..divided.trace },
+                directions: 96,
+                search: SearchOptions {
+                    max_planes: 10,
+                    scoring: SampleSize { lights: 512, pairs: 16_000 },
+                    ..divided.search
+                },
+                ..divided
+            },
         }
     }
 
     /// The default.
     #[must_use]
     pub fn balanced() -> Self {
-        Self {
-            receivers: 65_536,
-            lights: 256,
-            candidates: CandidateOptions { directions: 150, offsets: 12, surface_points: 400, seed: 0 },
-            selection: SelectionOptions {
+        let whole = Plan {
+            sections: 1,
+            trace: TraceOptions { pairs: 4_000_000, lights: 1024, stride: 4, exposure_rays: 24, seed: 0 },
+            directions: 96,
+            search: SearchOptions {
                 max_planes: 12,
-                min_gain: 0.002,
-                scoring_pairs: [150_000, 250_000],
+                proposals: 800,
+                screening: SampleSize { lights: 64, pairs: 30_000 },
+                screening_texels: 48,
+                finalists: 24,
+                refined: 3,
+                scoring: SampleSize { lights: 256, pairs: 150_000 },
                 texels: 96,
-                screening_pairs: 50_000,
-                finalists: 96,
-                refined: 4,
-                polished: 2,
                 refine_steps: 5,
-                replace_rounds: 1,
+                replace_rounds: 0,
+                seed: 0,
             },
-            texture_size: 256,
-        }
+            min_gain: 0.002,
+            lists: ListOptions { max_lookups: usize::MAX, grid: 255, rounds: 3, smoothing: 2 },
+            budget: BudgetOptions {
+                max_planes: usize::MAX,
+                bytes: TEXTURE_BUDGET,
+                texture_size: 128,
+                byte_gain: 2e-8,
+                smoothing: 2,
+            },
+        };
+        let divided = Plan {
+            sections: 96,
+            trace: TraceOptions { pairs: 12_000_000, lights: 2048, stride: 4, exposure_rays: 16, seed: 0 },
+            directions: 192,
+            search: SearchOptions {
+                max_planes: 16,
+                proposals: 200,
+                screening: SampleSize { lights: 512, pairs: 6_000 },
+                screening_texels: 32,
+                finalists: 8,
+                refined: 2,
+                scoring: SampleSize { lights: 2048, pairs: 24_000 },
+                texels: 48,
+                refine_steps: 4,
+                replace_rounds: 0,
+                seed: 0,
+            },
+            min_gain: 3e-6,
+            lists: ListOptions { max_lookups: 4, grid: 128, rounds: 3, smoothing: 1 },
+            budget: BudgetOptions { byte_gain: 2e-10, smoothing: 1, ..whole.budget },
+        };
+        Self { whole, divided }
     }
 
     /// When it may take minutes.
     #[must_use]
     pub fn best() -> Self {
-        let base = Self::balanced();
+        let Self { whole, divided } = Self::balanced();
         Self {
-            receivers: 98_304,
-            lights: 384,
-            candidates: CandidateOptions { directions: 300, offsets: 20, surface_points: 1000, ..base.candidates },
-            selection: SelectionOptions {
-                scoring_pairs: [400_000, 600_000],
-                refined: 8,
-                refine_steps: 6,
-                replace_rounds: 4,
-                ..base.selection
+            whole: Plan {
+                trace: TraceOptions { pairs: 12_000_000, lights: 2048, ..whole.trace },
+                search: SearchOptions {
+                    proposals: 2000,
+                    finalists: 48,
+                    refined: 6,
+                    scoring: SampleSize { lights: 1024, pairs: 400_000 },
+                    replace_rounds: 3,
+                    ..whole.search
+                },
+                ..whole
             },
-            ..base
+            divided: Plan {
+                sections: 160,
+                trace: TraceOptions { pairs: 48_000_000, lights: 4096, ..divided.trace },
+                search: SearchOptions {
+                    max_planes: 20,
+                    scoring: SampleSize { lights: 4096, pairs: 48_000 },
+                    ..divided.search
+                },
+                lists: ListOptions { grid: 160, ..divided.lists },
+                ..divided
+            },
         }
     }
 }

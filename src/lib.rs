@@ -4,6 +4,7 @@
 pub mod asset;
 pub mod cli;
 pub mod effort;
+mod fitting;
 pub mod gltf_file;
 pub mod pipeline;
 pub mod render;

@@ -3,6 +3,7 @@
 use crate::{
     asset::{self, AssetError, AssetRequest, Bounds},
     effort::Effort,
+    fitting::{Fitted, fit},
     render::RenderError,
     report::{CurvePoint, Lookups, Report, SCHEMA, Times},
     scene::{self, Scene, SceneError, Skipped},
@@ -10,18 +11,18 @@ use crate::{
 };
 use glam::{DVec3, Vec3};
 use shadowfit_solver::{
-    bake::{BakeOptions, bake},
     candidates::{CandidateOptions, generate},
+    certificate::Certificate,
+    columns::{ColumnOptions, certify_found},
     lights::LightDomain,
     mesh::{Mesh, MeshError},
     metrics::{Metrics, measure},
-    plane::{BakedPlane, BakedSet},
+    plane::BakedSet,
     receivers::{ReceiverOptions, Receivers, sample},
-    rectangle::Turn,
     sampling::hash,
-    selection::{SelectionOptions, Verdict, select},
+    selection::SelectionOptions,
     visibility::{Pairs, trace},
-    votes::{Mask, best_bias},
+    votes::Mask,
 };
 use std::{
     io::Cursor,
@@ -29,31 +30,25 @@ use std::{
     time::Instant,
 };
 
-/// Rays that estimate a receiver's exposure: in training, and on held-out receivers.
-const EXPOSURE_RAYS: [usize; 2] = [32, 64];
+/// Rays that estimate the exposure of a held-out receiver.
+const EXPOSURE_RAYS: usize = 64;
 
 /// Held-out receivers and lights: other numbers than any preset trains on, so that the lattices differ too.
 const HELD_OUT: [usize; 2] = [24_000, 307];
 
-/// Receivers and lights on which `--max-error` is decided.
-const JUDGING: [usize; 2] = [12_000, 211];
-
-/// `--max-error` aims this much lower: the judging pairs and the held-out ones are different samples.
-const TARGET_MARGIN: f64 = 0.98;
-
-/// Smallest gain of a plane while an error is to be reached: below it planes fit noise.
-const TARGET_MIN_GAIN: f64 = 5e-4;
-
-/// Most planes where `--max-error` is given without `--max-planes`.
-const TARGET_MAX_PLANES: usize = 64;
+/// Receivers and lights of the pairs that a certificate is about.
+const CERTIFIED: [usize; 2] = [24_576, 160];
 
 /// What a sampling is for: no two share their points.
 #[derive(Clone, Copy)]
-enum Purpose {
+pub(crate) enum Purpose {
     Training = 1,
     HeldOut,
     Judging,
     Image,
+    Pilot,
+    Directions,
+    Certificate,
 }
 
 /// One fit.
@@ -67,6 +62,14 @@ pub struct FitRequest {
     pub effort: Effort,
     /// Most planes, where the user names a number.
     pub max_planes: Option<usize>,
+    /// Most planes that a fragment reads, where the user names a number.
+    pub max_lookups: Option<usize>,
+    /// Sections, where the user names a number.
+    pub sections: Option<usize>,
+    /// Most bytes of all textures, where the user names a number.
+    pub texture_budget: Option<usize>,
+    /// How to prove a bound; none without.
+    pub certificate: Option<ColumnOptions>,
     /// The fewest planes that reach this held-out error.
     pub max_error: Option<f64>,
     /// Texels along the longer side, where the user names a number.
@@ -136,17 +139,6 @@ impl Clock {
     }
 }
 
-/// What the search and the bake leave behind.
-struct Fitted {
-    set: BakedSet,
-    /// The section of each triangle of the scene.
-    section_of: Vec<u32>,
-    /// The greedy phase's planes, baked in order: the first k are its answer for k planes.
-    greedy: Vec<BakedPlane>,
-    /// Seconds into the search at which each greedy plane was found.
-    found_at_s: Vec<f64>,
-}
-
 /// Loads, fits, bakes, writes, reads back and proves. `progress` is told what goes on.
 ///
 /// # Errors
@@ -161,19 +153,14 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
     let mesh = Mesh::new(&scene.soup).map_err(mesh_error)?;
     time_s.bvh = clock.lap();
 
-    progress("tracing the reference".to_string());
-    let effort = &request.effort;
-    let receivers = sample(&mesh, &receiver_options(effort.receivers, EXPOSURE_RAYS[0], request, Purpose::Training));
-    time_s.receivers = clock.lap();
-    let lights = request.domain.directions(effort.lights, seed_for(request, Purpose::Training));
-    let pairs = trace(&mesh, &receivers, &lights, request.domain.solid_angle());
-    time_s.reference = clock.lap();
-
-    let fitted = fit(request, (&mesh, scene.section_of.len()), &pairs, progress, (&mut clock, &mut time_s))?;
+    let fitted = fit(request, (&scene, &mesh), progress, &mut time_s)?;
+    clock.lap();
+    let certificate = certify(request, &mesh, &fitted, progress);
+    time_s.certificate = clock.lap();
 
     progress("writing the asset".to_string());
     let stem = stem_of(&request.model);
-    let (out_dir, bounds) = (request.out_dir.as_path(), receiver_bounds(&mesh, &receivers));
+    let (out_dir, bounds) = (request.out_dir.as_path(), bounds(&mesh));
     let asset_request = AssetRequest {
         input: &request.model,
         out_dir,
@@ -204,9 +191,9 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
         lookups: proof.lookups,
         texture_bytes: written.texture_bytes,
         held_out: proof.held_out,
-        training: measure(&fitted.set, &pairs, &receiver_sections(&mesh, &receivers, &fitted.section_of)),
+        training: fitted.training,
         image: proof.image,
-        certificate: None,
+        certificate,
         curve: proof.curve,
         time_s,
         peak_memory_bytes: peak_memory_bytes(),
@@ -242,7 +229,7 @@ fn prove(request: &FitRequest, mesh: &Mesh, fitted: &Fitted, written: &Path, sea
     let (pairs, receivers) = held_out(mesh, request, HELD_OUT, Purpose::HeldOut);
     let section_of = receiver_sections(mesh, &receivers, &scene.section_of);
     let held_out = measure(&set, &pairs, &section_of);
-    let curve = curve(fitted, &pairs, (set.planes.len(), &held_out), search_s);
+    let curve = curve(fitted, (&set, &held_out), (mesh, &pairs, &receivers), search_s);
     let mut proof =
         Proof { held_out, lookups: Lookups::measure(&set, &pairs, &section_of), curve, image: None, picture: None };
     if let Some(options) = &request.validation {
@@ -259,89 +246,35 @@ pub fn receiver_sections(mesh: &Mesh, receivers: &Receivers, section_of: &[u32])
     receivers.triangles.iter().map(|&triangle| section_of[mesh.source[triangle as usize] as usize]).collect()
 }
 
-/// The error of planes that every receiver reads.
-fn measure_one_section(planes: &[BakedPlane], pairs: &Pairs) -> Metrics {
-    measure(&BakedSet::one_section(planes.to_vec()), pairs, &vec![0; pairs.receivers])
-}
-
-/// Searches planes, or takes those of a file, and bakes them.
-fn fit(
+/// Where asked for: how far from the best planes of a pool, one list for all receivers, the ones found are.
+fn certify(
     request: &FitRequest,
-    (mesh, triangles): (&Mesh, usize),
-    pairs: &Pairs,
+    mesh: &Mesh,
+    fitted: &Fitted,
     progress: &mut dyn FnMut(String),
-    (clock, time_s): (&mut Clock, &mut Times),
-) -> Result<Fitted, FitError> {
-    let texture_size = request.texture_size.unwrap_or(request.effort.texture_size);
-    let options = BakeOptions { texture_size, ..BakeOptions::default() };
-    if let Some(path) = &request.planes {
-        let by_hand: Vec<Mask> = asset::read_plane_file(path)?
-            .iter()
-            .map(|given| {
-                let plane = given.rectangle.in_unit_space(&mesh.frame);
-                let (bias, _) = best_bias(pairs, &plane, request.effort.selection.texels);
-                Mask::open(plane, given.side, bias, 1, 1)
-            })
-            .collect();
-        time_s.search = clock.lap();
-        let planes = bake(pairs, &by_hand, &BakeOptions { turn: Turn::Fixed, ..options });
-        time_s.bake = clock.lap();
-        let (set, section_of) = (BakedSet::one_section(planes), vec![0; triangles]);
-        return Ok(Fitted { set, section_of, greedy: Vec::new(), found_at_s: Vec::new() });
-    }
-    let selection = selection_options(request);
-    let candidates = generate(mesh, &CandidateOptions { seed: request.seed, ..request.effort.candidates });
-    let judging = request.max_error.map(|target| (target, held_out(mesh, request, JUDGING, Purpose::Judging).0));
-    let (start, mut found_at_s) = (Instant::now(), Vec::new());
-    let selected = select(mesh, pairs, &candidates, &selection, &mut |planes| {
-        progress(format!("searching: {} planes", planes.len()));
-        found_at_s.push(start.elapsed().as_secs_f64());
-        match &judging {
-            Some((target, judging))
-                if measure_one_section(&bake(pairs, planes, &options), judging).shadow_error
-                    <= target * TARGET_MARGIN =>
-            {
-                Verdict::Enough
-            }
-            _ => Verdict::Continue,
-        }
-    });
-    time_s.search = clock.lap();
-    progress(format!("baking {} planes", selected.planes.len()));
-    let planes = bake(pairs, &selected.planes, &options);
-    let greedy = bake(pairs, &selected.greedy, &BakeOptions { rounds: 1, ..options });
-    time_s.bake = clock.lap();
-    let (set, section_of) = (BakedSet::one_section(planes), vec![0; triangles]);
-    Ok(Fitted { set, section_of, greedy, found_at_s })
+) -> Option<Certificate> {
+    let options = request.certificate.as_ref()?;
+    progress("proving a bound".to_string());
+    let (pairs, _) = held_out(mesh, request, CERTIFIED, Purpose::Certificate);
+    let found: Vec<Mask> =
+        fitted.searched.iter().map(|f| Mask::open(f.placed.plane, f.placed.side, f.placed.bias, 1, 1)).collect();
+    let candidates = generate(mesh, &CandidateOptions { seed: request.seed, ..CandidateOptions::default() });
+    Some(certify_found((mesh, &pairs), &found, &candidates, &SelectionOptions::default(), options))
 }
 
-/// The preset's options with the user's numbers.
-fn selection_options(request: &FitRequest) -> SelectionOptions {
-    let mut options = request.effort.selection;
-    if request.max_error.is_some() {
-        options.min_gain = TARGET_MIN_GAIN;
-        options.max_planes = TARGET_MAX_PLANES;
-    }
-    options.max_planes = request.max_planes.unwrap_or(options.max_planes);
-    options
-}
-
-fn seed_for(request: &FitRequest, purpose: Purpose) -> u64 {
+pub(crate) fn seed_for(request: &FitRequest, purpose: Purpose) -> u64 {
     hash(request.seed, purpose as u64)
 }
 
-fn receiver_options(count: usize, exposure_rays: usize, request: &FitRequest, purpose: Purpose) -> ReceiverOptions {
-    ReceiverOptions { count, exposure_rays, seed: seed_for(request, purpose) }
-}
-
 /// Pairs that the search does not see, and their receivers.
-fn held_out(
+pub(crate) fn held_out(
     mesh: &Mesh,
     request: &FitRequest,
     [receivers, lights]: [usize; 2],
     purpose: Purpose,
 ) -> (Pairs, Receivers) {
-    let receivers = sample(mesh, &receiver_options(receivers, EXPOSURE_RAYS[1], request, purpose));
+    let sampling = ReceiverOptions { count: receivers, exposure_rays: EXPOSURE_RAYS, seed: seed_for(request, purpose) };
+    let receivers = sample(mesh, &sampling);
     let lights = request.domain.directions(lights, seed_for(request, purpose));
     (trace(mesh, &receivers, &lights, request.domain.solid_angle()), receivers)
 }
@@ -354,30 +287,30 @@ fn validation_lights(request: &FitRequest, held_out: &Metrics, count: usize) -> 
     worst.into_iter().chain(others).take(count).collect()
 }
 
-/// Held-out error after each greedy plane; the last point is the result.
-fn curve(fitted: &Fitted, pairs: &Pairs, (planes, result): (usize, &Metrics), seconds: f64) -> Vec<CurvePoint> {
-    let none = CurvePoint::new(0, &measure_one_section(&[], pairs), 0.0);
-    let greedy = (1..planes.min(fitted.greedy.len() + 1)).map(|k| {
-        let seconds = fitted.found_at_s.get(k - 1).copied().unwrap_or(seconds);
-        CurvePoint::new(k, &measure_one_section(&fitted.greedy[..k], pairs), seconds)
-    });
-    let result = (planes > 0).then(|| CurvePoint::new(planes, result, seconds));
-    std::iter::once(none).chain(greedy).chain(result).collect()
+/// Held-out error of the smaller sets; the last point is the result.
+fn curve(
+    fitted: &Fitted,
+    written: (&BakedSet, &Metrics),
+    held_out: (&Mesh, &Pairs, &Receivers),
+    search_s: f64,
+) -> Vec<CurvePoint> {
+    let (mesh, pairs, receivers) = held_out;
+    let section_of = receiver_sections(mesh, receivers, &fitted.section_of);
+    let mut nothing = BakedSet { sections: fitted.set.sections.clone(), ..BakedSet::default() };
+    nothing.sections.iter_mut().for_each(Vec::clear);
+    let mut curve = vec![CurvePoint::new(&nothing, &measure(&nothing, pairs, &section_of), 0.0)];
+    let point = |(set, seconds): &(BakedSet, f64)| CurvePoint::new(set, &measure(set, pairs, &section_of), *seconds);
+    curve.extend(fitted.smaller.iter().map(point));
+    if !written.0.planes.is_empty() {
+        curve.push(CurvePoint::new(written.0, written.1, search_s));
+    }
+    curve
 }
 
-/// Box of the receivers in model space; of the model where nothing is seen.
-fn receiver_bounds(mesh: &Mesh, receivers: &Receivers) -> Bounds {
-    let extent = |points: &mut dyn Iterator<Item = Vec3>| {
-        points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
-            let p_model = mesh.frame.model_from_unit(p);
-            (low.min(p_model), high.max(p_model))
-        })
-    };
-    let (min, max) = if receivers.points.is_empty() {
-        extent(&mut mesh.corners.iter().flatten().copied())
-    } else {
-        extent(&mut receivers.points.iter().copied())
-    };
+/// Box of the mesh in model space.
+fn bounds(mesh: &Mesh) -> Bounds {
+    let corners = mesh.corners.iter().flatten().map(|p| mesh.frame.model_from_unit(*p));
+    let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
     Bounds { min, max }
 }
 

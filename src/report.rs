@@ -4,6 +4,7 @@ use crate::{scene::Skipped, validation::ImageErrors};
 use rayon::prelude::*;
 use serde::Serialize;
 use shadowfit_solver::{
+    certificate::Certificate,
     metrics::Metrics,
     plane::BakedSet,
     shade::set_rows,
@@ -43,9 +44,10 @@ pub struct Report {
     pub training: Metrics,
     /// Errors of rendered frames; `null` with `--validate none`.
     pub image: Option<ImageErrors>,
-    /// Proven bound; `null`: not computed by this version.
-    pub certificate: Option<()>,
-    /// Held-out error after each plane of the greedy phase; the last point is the result itself.
+    /// Proven bound on the training error of a sample; `null` without `--certificate`.
+    pub certificate: Option<Certificate>,
+    /// Held-out error of smaller sets: fewer planes of a whole model, fewer bytes of a divided one. The last point is
+    /// the result itself.
     pub curve: Vec<CurvePoint>,
     /// Seconds per stage.
     pub time_s: Times,
@@ -91,11 +93,13 @@ impl Lookups {
     }
 }
 
-/// Error for a number of planes.
+/// Error for a number of planes and bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CurvePoint {
     /// Planes.
     pub planes: usize,
+    /// Bytes of their textures, one a texel, before they are packed.
+    pub texture_bytes: usize,
     /// Held out.
     pub shadow_error: f64,
     /// Part of it: shadow not drawn.
@@ -122,6 +126,8 @@ pub struct Times {
     pub search: f64,
     /// Baking textures.
     pub bake: f64,
+    /// Proving the bound.
+    pub certificate: f64,
     /// Writing files.
     pub write: f64,
     /// Reading them back, held-out errors, frames.
@@ -133,8 +139,10 @@ pub struct Times {
 impl CurvePoint {
     /// A point from measured errors.
     #[must_use]
-    pub fn new(planes: usize, metrics: &Metrics, seconds: f64) -> Self {
-        Self { planes, shadow_error: metrics.shadow_error, missed: metrics.missed, false_: metrics.false_, seconds }
+    pub fn new(set: &BakedSet, metrics: &Metrics, seconds: f64) -> Self {
+        let Metrics { shadow_error, missed, false_, .. } = *metrics;
+        let texture_bytes = set.planes.iter().map(|baked| baked.texture.texels.len()).sum();
+        Self { planes: set.planes.len(), texture_bytes, shadow_error, missed, false_, seconds }
     }
 }
 
@@ -142,7 +150,8 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut line = |name: &str, value: String| writeln!(f, "{name:<14}{value}");
         line("model", format!("{} ({} triangles)", self.model, self.triangles))?;
-        line("planes", self.planes.to_string())?;
+        let sections = if self.sections > 1 { format!(" in {} sections", self.sections) } else { String::new() };
+        line("planes", format!("{}{sections}", self.planes))?;
         line("lookups", format!("{:.2} mean, {} max", self.lookups.mean, self.lookups.max))?;
         let held = &self.held_out;
         if held.shadow_error == 0.0 && self.planes == 0 && self.training.shadow_error == 0.0 {
@@ -152,6 +161,11 @@ impl fmt::Display for Report {
             line("shadow_error", format!("{error:.4} held out = {missed:.4} missed + {false_:.4} false"))?;
             let [x, y, z] = held.worst_light.direction;
             line("worst light", format!("{:.4} from ({x:.3}, {y:.3}, {z:.3})", held.worst_light.max))?;
+        }
+        if let Some(c) = &self.certificate {
+            let (found, bound, gap) = (c.found, c.lower_bound, c.gap);
+            let about = format!("{} planes of a pool of {}, {} training pairs", c.planes, c.pool, c.pairs);
+            line("certificate", format!("{found:.4} found, {bound:.4} proven bound, gap {gap:.4} ({about})"))?;
         }
         match &self.image {
             None => line("image", "not validated".to_string())?,

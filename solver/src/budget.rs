@@ -15,6 +15,8 @@ use rayon::prelude::*;
 /// How texels are given out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BudgetOptions {
+    /// Most planes.
+    pub max_planes: usize,
     /// Most bytes of all textures together.
     pub bytes: usize,
     /// Most texels along the longer side of a texture, 8 and up.
@@ -46,7 +48,8 @@ struct Offer {
 /// pairs.
 #[must_use]
 pub fn sizes(planes: &[&VotedPlane], shadow_weight: f64, options: &BudgetOptions) -> Vec<Option<(usize, usize)>> {
-    let offers: Vec<Vec<Offer>> = planes.par_iter().map(|plane| offers(plane, options)).collect();
+    let mut offers: Vec<Vec<Offer>> = planes.par_iter().map(|plane| offers(plane, options)).collect();
+    keep_best(&mut offers, options.max_planes);
     let choose = |price: f64| -> Vec<Option<Offer>> {
         let worth = |offer: &&Offer| offer.gain - price * offer.bytes as f64;
         let best = |offers: &Vec<Offer>| {
@@ -70,6 +73,16 @@ pub fn sizes(planes: &[&VotedPlane], shadow_weight: f64, options: &BudgetOptions
         chosen = choose(high);
     }
     chosen.into_iter().map(|offer| offer.map(|offer| offer.size)).collect()
+}
+
+/// Leaves offers only to the `count` planes with the largest gains.
+fn keep_best(offers: &mut [Vec<Offer>], count: usize) {
+    let gain = |k: usize| offers[k].iter().fold(0.0f64, |most, offer| most.max(offer.gain));
+    let mut order: Vec<(f64, usize)> = (0..offers.len()).map(|k| (gain(k), k)).collect();
+    order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    for (_, k) in order.into_iter().skip(count) {
+        offers[k].clear();
+    }
 }
 
 /// What a plane is worth at each size.
@@ -100,9 +113,9 @@ fn offers(plane: &VotedPlane, options: &BudgetOptions) -> Vec<Offer> {
     offers
 }
 
-/// Square texels, `size` along the longer side with the ring, and at least one inside it.
+/// Square texels, `size` along the longer side, and at least one inside the ring.
 fn texture_shape(plane: &VotedPlane, size: usize) -> (usize, usize) {
     let longer = plane.width.max(plane.height) as f32;
-    let count = |cells: usize| ((cells as f32 / longer * (size - 2) as f32).round() as usize).max(1) + 2;
+    let count = |cells: usize| ((cells as f32 / longer * size as f32).round() as usize).max(3);
     (count(plane.width), count(plane.height))
 }

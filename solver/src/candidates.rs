@@ -50,6 +50,12 @@ pub struct CandidateOptions {
     pub seed: u64,
 }
 
+impl Default for CandidateOptions {
+    fn default() -> Self {
+        Self { directions: 150, offsets: 12, surface_points: 400, seed: 0 }
+    }
+}
+
 /// Planes square to the axes have this many times the offsets of the others.
 const AXIS_FINENESS: usize = 4;
 

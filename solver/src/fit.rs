@@ -1,10 +1,13 @@
-//! The fit: from traced pairs to planes in sections, with textures and active lists.
+//! Bake: the final textures of all sections' planes, and the lists that read them.
+//!
+//! In: per section, planes with votes on fine grids and a list per direction. Out: one set. Each plane gets a distance
+//! field of the size that the budget gives it; planes that are not worth their bytes leave the lists.
 
 use crate::{
     budget::{self, BudgetOptions},
     field::{VoteGrid, VotedShape},
     lists::{SectionFit, VotedPlane},
-    plane::{ActiveLists, BakedPlane, BakedSet, ShadowPlane, Side},
+    plane::{ActiveLists, BakedPlane, BakedSet, PlacedPlane},
 };
 use glam::Vec3;
 use rayon::prelude::*;
@@ -45,12 +48,6 @@ fn baked(plane: &VotedPlane, size: (usize, usize), smoothing: usize) -> Option<B
     let grid = VoteGrid { votes: &votes, width: plane.width, height: plane.height };
     let texture = VotedShape::new(grid, smoothing).field(size);
     let blocks = texture.texels.iter().any(|&texel| !texture.is_open(texel));
-    let plane = BakedPlane { plane: plane.plane, texture, side: Side::Both, bias: plane.bias };
-    blocks.then_some(plane)
-}
-
-/// The rectangle enlarged by the texture's outermost ring.
-fn with_ring(plane: &ShadowPlane, (width, height): (usize, usize)) -> ShadowPlane {
-    let (su, sv) = (plane.u / (width - 2) as f32, plane.v / (height - 2) as f32);
-    ShadowPlane { origin: plane.origin - su - sv, u: su * width as f32, v: sv * height as f32 }
+    let PlacedPlane { plane, side, bias } = plane.placed;
+    blocks.then_some(BakedPlane { plane, texture, side, bias })
 }

@@ -9,7 +9,7 @@
 
 use crate::{
     pair_table::{LightRows, MAX_TEXELS, PairTable, SPARE},
-    plane::ShadowPlane,
+    plane::PlacedPlane,
     search::Found,
     votes::{fill_unvoted, smoothed},
 };
@@ -32,10 +32,8 @@ pub struct ListOptions {
 /// A plane with what it has to block.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VotedPlane {
-    /// Where it lies.
-    pub plane: ShadowPlane,
-    /// A receiver nearer than this along the ray is not shadowed, unit space.
-    pub bias: f32,
+    /// Where it lies and how it casts.
+    pub placed: PlacedPlane,
     /// Texels of the grid along u.
     pub width: usize,
     /// Texels of the grid along v.
@@ -55,7 +53,7 @@ pub struct SectionFit {
 
 /// A plane while textures and lists change.
 struct Candidate {
-    found: Found,
+    placed: PlacedPlane,
     size: (usize, usize),
     /// Texel of each pair of the table.
     texels: Vec<u16>,
@@ -81,7 +79,7 @@ struct Assignment<'a> {
 /// Makes the lists of one section.
 #[must_use]
 pub fn assign(table: &PairTable, planes: &[Found], options: &ListOptions) -> SectionFit {
-    let candidates = planes.par_iter().map(|found| Candidate::new(table, *found, options.grid)).collect();
+    let candidates = planes.par_iter().map(|found| Candidate::new(table, found.placed, options.grid)).collect();
     let mut assignment = Assignment {
         table,
         options,
@@ -101,15 +99,15 @@ pub fn assign(table: &PairTable, planes: &[Found], options: &ListOptions) -> Sec
 }
 
 impl Candidate {
-    fn new(table: &PairTable, found: Found, grid: usize) -> Self {
-        let (u, v) = (found.plane.u.length(), found.plane.v.length());
+    fn new(table: &PairTable, placed: PlacedPlane, grid: usize) -> Self {
+        let (u, v) = (placed.plane.u.length(), placed.plane.v.length());
         let texel = u.max(v) / grid as f32;
         let count = |length: f32| ((length / texel).ceil() as usize).clamp(1, grid);
         let size = (count(u), count(v));
         let mut texels = Vec::new();
-        table.crossings(&found.plane, found.bias, size, &mut texels);
+        table.crossings(&placed, size, &mut texels);
         let open = || vec![0; size.0 * size.1 + SPARE];
-        Self { found, size, texels, blocked: open(), by_fold: [open(), open()] }
+        Self { placed, size, texels, blocked: open(), by_fold: [open(), open()] }
     }
 }
 
@@ -279,8 +277,8 @@ impl Assignment<'_> {
         let used: Vec<usize> = (0..self.planes.len()).filter(|&k| self.read.iter().any(|read| read[k])).collect();
         let list = |read: &Vec<bool>| (0..).zip(&used).filter(|(_, k)| read[**k]).map(|(i, _)| i).collect();
         let planes = used.iter().map(|&k| {
-            let Candidate { found, size: (width, height), .. } = self.planes[k];
-            VotedPlane { plane: found.plane, bias: found.bias, width, height, votes: self.votes(k) }
+            let Candidate { placed, size: (width, height), .. } = self.planes[k];
+            VotedPlane { placed, width, height, votes: self.votes(k) }
         });
         SectionFit { planes: planes.collect(), lists: self.read.iter().map(list).collect() }
     }

@@ -1,6 +1,7 @@
 //! How wrong baked planes are against the traced reference.
 
 use crate::{
+    pair_table::{LightRows, PairTable},
     plane::BakedSet,
     shade::{set_rows, visibility},
     visibility::{LightPairs, Pairs},
@@ -47,23 +48,62 @@ struct LightError {
     false_: f64,
 }
 
+impl LightError {
+    fn add(&mut self, vote: f32, predicted: f32) {
+        let (vote, predicted) = (f64::from(vote), f64::from(predicted));
+        if vote > 0.0 {
+            self.missed += vote * predicted;
+        } else {
+            self.false_ -= vote * (1.0 - predicted);
+        }
+    }
+}
+
 /// Measures planes with the shader's arithmetic, bilinear taps and all. `section_of` has one entry a receiver.
 #[must_use]
 pub fn measure(set: &BakedSet, pairs: &Pairs, section_of: &[u32]) -> Metrics {
-    let count = pairs.lights.len();
-    let mut metrics = Metrics { receivers: pairs.receivers, lights: count, ..Metrics::default() };
-    if pairs.shadow_weight <= 0.0 {
+    let errors = pairs.lights.par_iter().map(|light| measure_light(set, light, section_of)).collect();
+    let lights: Vec<Vec3> = pairs.lights.iter().map(|light| light.light).collect();
+    let metrics = from_errors(errors, &lights, (pairs.shadow_weight, pairs.total_weight));
+    Metrics { receivers: pairs.receivers, ..metrics }
+}
+
+/// The same on the pairs that decided the planes, one table a section, all under the same lights.
+#[must_use]
+pub fn measure_tables(set: &BakedSet, tables: &[PairTable]) -> Metrics {
+    let lights: Vec<Vec3> = tables.first().map_or_else(Vec::new, |t| t.lights.iter().map(|rows| rows.light).collect());
+    let of_light = |(k, light): (usize, &Vec3)| {
+        let (rows, lists) = (set_rows(set, *light), set.lists(*light));
+        let mut error = LightError::default();
+        for (table, list) in tables.iter().zip(lists) {
+            let LightRows { start, end, .. } = table.lights[k];
+            for i in start..end {
+                error.add(table.vote[i], visibility(&set.planes, &rows, list, table.point(i)));
+            }
+        }
+        error
+    };
+    let errors = lights.par_iter().enumerate().map(of_light).collect();
+    let weights = tables.iter().map(PairTable::weights).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+    let receivers = tables.iter().map(|table| table.receivers).sum();
+    Metrics { receivers, ..from_errors(errors, &lights, weights) }
+}
+
+/// Sums of all lights, with the worst one. Where nothing is in shadow all are 0.
+fn from_errors(errors: Vec<LightError>, lights: &[Vec3], (shadow, total): (f64, f64)) -> Metrics {
+    let count = lights.len();
+    let mut metrics = Metrics { lights: count, ..Metrics::default() };
+    if shadow <= 0.0 {
         return metrics;
     }
-    let errors: Vec<LightError> = pairs.lights.par_iter().map(|light| measure_light(set, light, section_of)).collect();
     let sum = |part: fn(&LightError) -> f64| errors.iter().map(part).sum::<f64>();
-    metrics.missed = sum(|e| e.missed) / pairs.shadow_weight;
-    metrics.false_ = sum(|e| e.false_) / pairs.shadow_weight;
+    metrics.missed = sum(|e| e.missed) / shadow;
+    metrics.false_ = sum(|e| e.false_) / shadow;
     metrics.shadow_error = metrics.missed + metrics.false_;
-    metrics.light_error = metrics.shadow_error * pairs.shadow_weight / pairs.total_weight;
-    let mean_shadow = pairs.shadow_weight / count as f64;
+    metrics.light_error = metrics.shadow_error * shadow / total;
+    let mean_shadow = shadow / count as f64;
     let mut by_light: Vec<(f64, Vec3)> =
-        errors.iter().zip(&pairs.lights).map(|(e, l)| ((e.missed + e.false_) / mean_shadow, l.light)).collect();
+        errors.iter().zip(lights).map(|(e, l)| ((e.missed + e.false_) / mean_shadow, *l)).collect();
     by_light.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (max, direction) = by_light[count - 1];
     metrics.worst_light = WorstLight { max, p95: by_light[(count - 1) * 95 / 100].0, direction: direction.to_array() };
@@ -75,13 +115,7 @@ fn measure_light(set: &BakedSet, light: &LightPairs, section_of: &[u32]) -> Ligh
     let mut error = LightError::default();
     for i in 0..light.len() {
         let list = &lists[section_of[light.receiver[i] as usize] as usize];
-        let predicted = f64::from(visibility(&set.planes, &rows, list, light.point(i)));
-        let vote = f64::from(light.vote[i]);
-        if vote > 0.0 {
-            error.missed += vote * predicted;
-        } else {
-            error.false_ -= vote * (1.0 - predicted);
-        }
+        error.add(light.vote[i], visibility(&set.planes, &rows, list, light.point(i)));
     }
     error
 }

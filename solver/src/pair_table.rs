@@ -5,12 +5,7 @@
 //! as the search of whole models had them, hid most of the over-fitting: with 384 lights in 64 sections the held-out
 //! error was 0.058 on new receivers, 0.069 under new lights and 0.049 on the training pairs.
 
-use crate::{
-    plane::{ShadowPlane, Side},
-    sampling::uniform,
-    shade::plane_rows,
-    visibility::Pairs,
-};
+use crate::{plane::PlacedPlane, sampling::uniform, shade::plane_rows, visibility::Pairs};
 use glam::Vec3;
 use pulp::Arch;
 
@@ -78,7 +73,8 @@ impl PairTable {
     /// All pairs of `pairs`, whose lights are served by `directions` (unit vectors).
     #[must_use]
     pub fn new(pairs: &Pairs, directions: &[Vec3]) -> Self {
-        let mut order: Vec<(usize, usize)> = pairs.lights.iter().map(|l| nearest(directions, l.light)).zip(0..).collect();
+        let mut order: Vec<(usize, usize)> =
+            pairs.lights.iter().map(|l| nearest(directions, l.light)).zip(0..).collect();
         order.sort_unstable();
         let mut table = Self { directions: directions.len(), receivers: pairs.receivers, ..Self::default() };
         table.reserve(pairs.len(), order.len());
@@ -114,6 +110,14 @@ impl PairTable {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.vote.is_empty()
+    }
+
+    /// Sum of the weights of blocked pairs, and of all.
+    #[must_use]
+    pub fn weights(&self) -> (f64, f64) {
+        self.vote.iter().fold((0.0, 0.0), |(shadow, total), &vote| {
+            (shadow + f64::from(vote.max(0.0)), total + f64::from(vote.abs()))
+        })
     }
 
     /// Receiver position of pair `i`.
@@ -185,14 +189,14 @@ impl PairTable {
         })
     }
 
-    /// The texel of each pair's crossing on a grid of `width` x `height` over `plane`; `width * height` and up: none.
+    /// The texel of each pair's crossing on a grid of `width` x `height` over a plane; `width * height` and up: none.
     ///
     /// # Panics
     /// The grid has more than [`MAX_TEXELS`].
-    pub fn crossings(&self, plane: &ShadowPlane, bias: f32, (width, height): (usize, usize), out: &mut Vec<u16>) {
+    pub fn crossings(&self, placed: &PlacedPlane, (width, height): (usize, usize), out: &mut Vec<u16>) {
         out.resize(self.len(), 0);
         for rows in &self.lights {
-            self.crossings_of_light(rows, plane, bias, (width, height), &mut out[rows.start..rows.end]);
+            self.crossings_of_light(rows, placed, (width, height), &mut out[rows.start..rows.end]);
         }
     }
 
@@ -203,17 +207,17 @@ impl PairTable {
     pub fn crossings_of_light(
         &self,
         light: &LightRows,
-        plane: &ShadowPlane,
-        bias: f32,
+        placed: &PlacedPlane,
         (width, height): (usize, usize),
         out: &mut [u16],
     ) {
         assert!(width * height <= MAX_TEXELS, "{width} x {height} texels");
         let (outside, w, h) = ((width * height) as u32, width as f32, height as f32);
-        let Some(rows) = plane_rows(plane, Side::Both, light.light) else {
+        let Some(rows) = plane_rows(&placed.plane, placed.side, light.light) else {
             out.fill(outside as u16);
             return;
         };
+        let bias = placed.bias;
         let [ra, rb, rs] = [rows.a * w, rows.b * h, rows.s].map(|row| row.to_array());
         let range = light.start..light.end;
         let (x, y, z) = (&self.x[range.clone()], &self.y[range.clone()], &self.z[range]);

@@ -36,6 +36,17 @@ pub enum Side {
     Back,
 }
 
+/// A rectangle with the rules by which it casts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacedPlane {
+    /// Where it lies.
+    pub plane: ShadowPlane,
+    /// Which receivers it serves.
+    pub side: Side,
+    /// A receiver nearer than this along the ray is not shadowed, unit space.
+    pub bias: f32,
+}
+
 /// How a texel is to be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

@@ -89,6 +89,9 @@ impl Strata {
 
 fn draw(mesh: &Mesh, strata: &Strata, options: &ReceiverOptions, count: usize) -> Receivers {
     let total = strata.running_area.last().copied().unwrap_or(0.0);
+    if strata.sides.is_empty() {
+        return Receivers::default();
+    }
     let area = (total / count as f64) as f32;
     let one = |i: usize| -> Option<(Vec3, Vec3, Vec3, f32, u32)> {
         let at = (i as f64 + uniform(options.seed, i as u64)) / count as f64 * total;

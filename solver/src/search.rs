@@ -16,7 +16,7 @@
 use crate::{
     mesh::{Mesh, ray_origin},
     pair_table::{PairTable, SPARE, SampleSize},
-    plane::ShadowPlane,
+    plane::{PlacedPlane, ShadowPlane, Side},
     rectangle::{around_section, enlarged, shifted, tight_around},
     sampling::{hash, uniform},
     votes::smoothed,
@@ -54,10 +54,8 @@ pub struct SearchOptions {
 /// A plane that the search found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
-    /// Where it lies.
-    pub plane: ShadowPlane,
-    /// A receiver nearer than this along the ray is not shadowed, unit space.
-    pub bias: f32,
+    /// Where it lies and how it casts.
+    pub placed: PlacedPlane,
     /// Drop of the weighted error when it was found.
     pub gain: f64,
 }
@@ -153,10 +151,7 @@ pub fn search(
     min_gain: f64,
     judge: &mut dyn FnMut(&[Found]) -> Verdict,
 ) -> Selection {
-    let corners = || mesh.corners.iter().flatten();
-    let low = corners().fold(Vec3::INFINITY, |a, p| a.min(*p)) - PAD;
-    let high = corners().fold(Vec3::NEG_INFINITY, |a, p| a.max(*p)) + PAD;
-    let search = Search { mesh, table, options, low, high };
+    let search = Search::new(mesh, table, options);
     let (greedy, verdict) = search.greedy(min_gain, judge);
     let mut planes = greedy.clone();
     let mut replaced = 0;
@@ -173,7 +168,14 @@ pub fn search(
     Selection { planes, greedy, replaced }
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    fn new(mesh: &'a Mesh, table: &'a PairTable, options: &'a SearchOptions) -> Self {
+        let corners = || mesh.corners.iter().flatten();
+        let low = corners().fold(Vec3::INFINITY, |a, p| a.min(*p)) - PAD;
+        let high = corners().fold(Vec3::NEG_INFINITY, |a, p| a.max(*p)) + PAD;
+        Self { mesh, table, options, low, high }
+    }
+
     fn greedy(&self, min_gain: f64, judge: &mut dyn FnMut(&[Found]) -> Verdict) -> (Vec<Found>, Verdict) {
         let mut planes = Vec::new();
         let mut covered = vec![false; self.table.len()];
@@ -184,7 +186,7 @@ impl Search<'_> {
             if found.gain < min_gain {
                 break;
             }
-            covered.iter_mut().zip(self.covered_by(&found, &cast)).for_each(|(a, b)| *a |= b);
+            covered.iter_mut().zip(self.covered_by(&found.placed, &cast)).for_each(|(a, b)| *a |= b);
             planes.push(found);
             if judge(&planes) == Verdict::Enough {
                 return (planes, Verdict::Enough);
@@ -202,11 +204,11 @@ impl Search<'_> {
             let open = self.table.filtered(|i| !covers.iter().enumerate().any(|(j, cover)| j != k && cover[i]));
             let seed = hash(self.options.seed ^ 0x5EED, (round * planes.len() + k) as u64);
             let scoring = open.sample(self.options.scoring, seed);
-            let kept = Found { gain: self.gain(&scoring, &planes[k], &mut scratch), ..planes[k] };
+            let kept = Found { gain: self.gain(&scoring, &planes[k].placed, &mut scratch), ..planes[k] };
             let found = self.best_plane(&open, seed, Some(&planes[k]));
             if let Some((found, cast)) = found.filter(|(found, _)| found.gain > kept.gain * (1.0 + REPLACE_MARGIN)) {
                 exchanges += 1;
-                covers[k] = self.covered_by(&found, &cast);
+                covers[k] = self.covered_by(&found.placed, &cast);
                 planes[k] = found;
             } else {
                 planes[k] = kept;
@@ -235,7 +237,7 @@ impl Search<'_> {
         let covers = self.covers(planes);
         let gain = |k: usize| {
             let open = self.table.filtered(|i| !covers.iter().enumerate().any(|(j, cover)| j != k && cover[i]));
-            self.gain(&open.sample(self.options.scoring, self.options.seed), &planes[k], &mut Scratch::default())
+            self.gain(&open.sample(self.options.scoring, self.options.seed), &planes[k].placed, &mut Scratch::default())
         };
         (0..planes.len()).map(gain).collect()
     }
@@ -246,7 +248,7 @@ impl Search<'_> {
         let mut any = vec![false; self.table.len()];
         let cover = |found: &Found| {
             let open = self.table.filtered(|i| !any[i]).sample(self.options.scoring, self.options.seed);
-            let cover = self.covered_by(found, &self.cast(&open, found, &mut scratch));
+            let cover = self.covered_by(&found.placed, &self.cast(&open, &found.placed, &mut scratch));
             any.iter_mut().zip(&cover).for_each(|(a, b)| *a |= b);
             cover
         };
@@ -260,66 +262,75 @@ impl Search<'_> {
         let screening = &scoring.sample(o.screening, hash(seed, 1));
         let wide: Vec<ShadowPlane> = self.proposals(scoring, seed);
         let screened = measured(wide, |plane, scratch| {
-            Some((windowed(screening, plane, BIAS, o.screening_texels, scratch), *plane))
+            Some((windowed(screening, &placed_anew(*plane), o.screening_texels, scratch), *plane))
         });
         let finalists: Vec<ShadowPlane> = screened.into_iter().take(o.finalists).map(|(_, plane)| plane).collect();
         let mut tight = measured(finalists, |plane, scratch| {
-            let plane = self.tight(scoring, &Found { plane: *plane, bias: BIAS, gain: 0.0 }, ROOM[0], scratch)?;
-            Some((windowed(scoring, &plane, BIAS, o.texels, scratch), plane))
+            let plane = self.tight(scoring, &placed_anew(*plane), ROOM[0], scratch)?;
+            Some((windowed(scoring, &placed_anew(plane), o.texels, scratch), plane))
         });
         tight.truncate(o.refined);
-        let starts: Vec<Found> = tight.iter().map(|(gain, plane)| Found { plane: *plane, bias: BIAS, gain: *gain }).collect();
+        let starts: Vec<Found> =
+            tight.iter().map(|(gain, plane)| Found { placed: placed_anew(*plane), gain: *gain }).collect();
         let starts: Vec<Found> = starts.into_iter().chain(start.copied()).collect();
-        let refined: Vec<Found> =
-            starts.par_iter().map_init(Scratch::default, |scratch, found| self.refine(scoring, *found, scratch)).collect();
+        let refined: Vec<Found> = starts
+            .par_iter()
+            .map_init(Scratch::default, |scratch, found| self.refine(scoring, *found, scratch))
+            .collect();
         let best = refined.into_iter().reduce(|a, b| if b.gain > a.gain { b } else { a })?;
-        let cast = self.cast(scoring, &best, &mut Scratch::default());
+        let cast = self.cast(scoring, &best.placed, &mut Scratch::default());
         Some((best, cast))
     }
 
-    fn gain(&self, pairs: &PairTable, found: &Found, scratch: &mut Scratch) -> f64 {
-        windowed(pairs, &found.plane, found.bias, self.options.texels, scratch)
+    fn gain(&self, pairs: &PairTable, placed: &PlacedPlane, scratch: &mut Scratch) -> f64 {
+        windowed(pairs, placed, self.options.texels, scratch)
     }
 
     /// Compass search (a step each way in both tilts and the offset; what gains is kept, else the step is halved), then
     /// a tight rectangle, then the bias.
     fn refine(&self, pairs: &PairTable, start: Found, scratch: &mut Scratch) -> Found {
-        let mut at = Found { gain: self.gain(pairs, &start, scratch), ..start };
+        let mut at = Found { gain: self.gain(pairs, &start.placed, scratch), ..start };
         let mut tilt = FIRST_TILT;
         for _ in 0..self.options.refine_steps {
             for direction in 0..3 {
                 for step in [tilt, -tilt] {
-                    let moved = Found { plane: shifted(&at.plane, direction, step), ..at };
+                    let moved = PlacedPlane { plane: shifted(&at.placed.plane, direction, step), ..at.placed };
                     let gain = self.gain(pairs, &moved, scratch);
                     if gain > at.gain {
-                        at = Found { gain, ..moved };
+                        at = Found { placed: moved, gain };
                         break;
                     }
                 }
             }
             tilt *= 0.5;
         }
-        if let Some(plane) = self.tight(pairs, &at, ROOM[1], scratch) {
-            let tight = Found { plane, ..at };
+        if let Some(plane) = self.tight(pairs, &at.placed, ROOM[1], scratch) {
+            let tight = PlacedPlane { plane, ..at.placed };
             let gain = self.gain(pairs, &tight, scratch);
             if gain > at.gain * TIGHTER_IS_WORTH {
-                at = Found { gain, ..tight };
+                at = Found { placed: tight, gain };
             }
         }
+        self.with_bias(pairs, at, scratch)
+    }
+
+    /// The plane with the bias that gains most.
+    fn with_bias(&self, pairs: &PairTable, start: Found, scratch: &mut Scratch) -> Found {
+        let mut best = start;
         for bias in BIASES {
-            let other = Found { bias, ..at };
-            let gain = self.gain(pairs, &other, scratch);
-            if gain > at.gain {
-                at = Found { gain, ..other };
+            let placed = PlacedPlane { bias, ..start.placed };
+            let gain = self.gain(pairs, &placed, scratch);
+            if gain > best.gain {
+                best = Found { placed, gain };
             }
         }
-        at
+        best
     }
 
     /// The texture that all pairs of the plane's window decide, and the window.
-    fn cast(&self, pairs: &PairTable, found: &Found, scratch: &mut Scratch) -> Cast {
+    fn cast(&self, pairs: &PairTable, placed: &PlacedPlane, scratch: &mut Scratch) -> Cast {
         let n = self.options.texels;
-        self.gain(pairs, found, scratch);
+        self.gain(pairs, placed, scratch);
         let votes = window_votes(pairs, n, scratch);
         let mut blocked: Vec<u8> = smoothed(&votes, n).into_iter().map(|vote| u8::from(vote > 0.0)).collect();
         blocked.resize(n * n + SPARE, 0);
@@ -327,22 +338,22 @@ impl Search<'_> {
     }
 
     /// The rectangle in the same plane, tight around what blocks in its window.
-    fn tight(&self, pairs: &PairTable, found: &Found, room: f32, scratch: &mut Scratch) -> Option<ShadowPlane> {
+    fn tight(&self, pairs: &PairTable, placed: &PlacedPlane, room: f32, scratch: &mut Scratch) -> Option<ShadowPlane> {
         let n = self.options.texels;
-        self.gain(pairs, found, scratch);
+        self.gain(pairs, placed, scratch);
         let votes = window_votes(pairs, n, scratch);
         let mut blocking = smoothed(&votes, n);
         blocking.iter_mut().zip(&votes).for_each(|(s, v)| *s = if *s > 0.0 { v.max(0.0) } else { 0.0 });
-        Some(enlarged(&tight_around(&found.plane, &blocking, n)?, room))
+        Some(enlarged(&tight_around(&placed.plane, &blocking, n)?, room))
     }
 
     /// Which pairs of the whole table the plane covers.
-    fn covered_by(&self, found: &Found, cast: &Cast) -> Vec<bool> {
+    fn covered_by(&self, placed: &PlacedPlane, cast: &Cast) -> Vec<bool> {
         let n = self.options.texels;
         let of_light = |rows: &crate::pair_table::LightRows| {
             let mut texels = vec![0u16; rows.end - rows.start];
             if cast.window[rows.direction] {
-                self.table.crossings_of_light(rows, &found.plane, found.bias, (n, n), &mut texels);
+                self.table.crossings_of_light(rows, placed, (n, n), &mut texels);
                 texels.iter().map(|&texel| cast.blocked[texel as usize] != 0).collect()
             } else {
                 vec![false; texels.len()]
@@ -367,7 +378,9 @@ impl Search<'_> {
                 }
             }
         }
-        let planes = |(k, (point, light)): (usize, &(Vec3, Vec3))| self.through_blocker(*point, *light, hash(seed, 2 + k as u64));
+        let planes = |(k, (point, light)): (usize, &(Vec3, Vec3))| {
+            self.through_blocker(*point, *light, hash(seed, 2 + k as u64))
+        };
         drawn.par_iter().enumerate().flat_map_iter(planes).collect()
     }
 
@@ -376,7 +389,8 @@ impl Search<'_> {
         let surface = self.mesh.normals[hit.triangle as usize];
         let inward = if surface.dot(light) > 0.0 { surface } else { -surface };
         let entry = point + light * (LOOKUP_OFFSET + hit.distance);
-        let thickness = self.mesh.nearest(ray_origin(entry, inward), inward, |_, _| true).map_or(0.0, |hit| hit.distance);
+        let thickness =
+            self.mesh.nearest(ray_origin(entry, inward), inward, |_, _| true).map_or(0.0, |hit| hit.distance);
         let middle = entry + inward * (0.5 * thickness.min(MAX_THICKNESS));
         let (t, b) = surface.any_orthonormal_pair();
         let (sin, cos) = (std::f64::consts::TAU * uniform(seed, 0)).sin_cos();
@@ -389,6 +403,23 @@ impl Search<'_> {
         let normals: [Vec3; PER_BLOCKER] = [surface, across, light, axis, any];
         normals.iter().filter_map(|n| around_section(self.low, self.high, *n, n.dot(middle))).collect()
     }
+}
+
+/// Planes that a person placed, in their order, with the biases that gain most.
+#[must_use]
+pub fn place(mesh: &Mesh, table: &PairTable, planes: &[(ShadowPlane, Side)], options: &SearchOptions) -> Vec<Found> {
+    let search = Search::new(mesh, table, options);
+    let sample = table.sample(options.scoring, options.seed);
+    let place = |scratch: &mut Scratch, &(plane, side): &(ShadowPlane, Side)| {
+        let placed = PlacedPlane { plane, side, bias: BIAS };
+        search.with_bias(&sample, Found { placed, gain: 0.0 }, scratch)
+    };
+    planes.par_iter().map_init(Scratch::default, place).collect()
+}
+
+/// A plane as a search starts with it.
+fn placed_anew(plane: ShadowPlane) -> PlacedPlane {
+    PlacedPlane { plane, side: Side::Both, bias: BIAS }
 }
 
 /// Planes proposed through one blocker.
@@ -407,8 +438,8 @@ fn measured(
 
 /// Drop of the weighted error by a plane with a texture of `n` x `n` that is read only where it gains, counted under
 /// lights that did not decide the texture. Leaves texels and gains per direction in `scratch`.
-fn windowed(pairs: &PairTable, plane: &ShadowPlane, bias: f32, n: usize, scratch: &mut Scratch) -> f64 {
-    pairs.crossings(plane, bias, (n, n), &mut scratch.texels);
+fn windowed(pairs: &PairTable, placed: &PlacedPlane, n: usize, scratch: &mut Scratch) -> f64 {
+    pairs.crossings(placed, (n, n), &mut scratch.texels);
     let count = n * n + SPARE;
     let Scratch { texels, votes, blocked, gains } = scratch;
     gains.clear();

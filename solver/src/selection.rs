@@ -52,6 +52,23 @@ pub struct SelectionOptions {
     pub replace_rounds: usize,
 }
 
+impl Default for SelectionOptions {
+    fn default() -> Self {
+        Self {
+            max_planes: 12,
+            min_gain: 0.002,
+            scoring_pairs: [60_000, 120_000],
+            texels: 64,
+            screening_pairs: 30_000,
+            finalists: 48,
+            refined: 3,
+            polished: 2,
+            refine_steps: 5,
+            replace_rounds: 0,
+        }
+    }
+}
+
 /// What the caller says to a set of planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
@@ -330,7 +347,7 @@ impl Search<'_> {
 }
 
 /// The best `count` planes no two of which are nearly the same.
-fn distinct(mut scored: Vec<(f64, ShadowPlane)>, count: usize) -> Vec<(f64, ShadowPlane)> {
+pub(crate) fn distinct(mut scored: Vec<(f64, ShadowPlane)>, count: usize) -> Vec<(f64, ShadowPlane)> {
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut kept: Vec<(f64, ShadowPlane)> = Vec::new();
     for (gain, plane) in scored {

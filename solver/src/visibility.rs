@@ -117,7 +117,8 @@ pub fn trace(mesh: &Mesh, receivers: &Receivers, lights: &[Vec3], solid_angle: f
 #[must_use]
 pub fn trace_sparse(mesh: &Mesh, receivers: &Receivers, lights: &[Vec3], solid_angle: f64, stride: usize) -> Pairs {
     let share = (solid_angle / lights.len().max(1) as f64) as f32 * stride as f32;
-    let lights: Vec<LightPairs> = lights.par_iter().enumerate().map(|(k, &l)| trace_light(mesh, receivers, l, share, (stride, k))).collect();
+    let lights: Vec<LightPairs> =
+        lights.par_iter().enumerate().map(|(k, &l)| trace_light(mesh, receivers, l, share, (stride, k))).collect();
     let (mut shadow_weight, mut total_weight) = (0.0, 0.0);
     for vote in lights.iter().flat_map(|l| &l.vote) {
         shadow_weight += f64::from(vote.max(0.0));
@@ -126,7 +127,13 @@ pub fn trace_sparse(mesh: &Mesh, receivers: &Receivers, lights: &[Vec3], solid_a
     Pairs { lights, shadow_weight, total_weight, receivers: receivers.points.len() }
 }
 
-fn trace_light(mesh: &Mesh, receivers: &Receivers, light: Vec3, solid_angle: f32, (stride, index): (usize, usize)) -> LightPairs {
+fn trace_light(
+    mesh: &Mesh,
+    receivers: &Receivers,
+    light: Vec3,
+    solid_angle: f32,
+    (stride, index): (usize, usize),
+) -> LightPairs {
     let mut pairs = LightPairs::with_capacity(light, receivers.points.len() / 2 / stride);
     for fold in 0..2 {
         pairs.split = if fold == 1 { pairs.len() } else { 0 };

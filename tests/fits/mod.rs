@@ -28,6 +28,7 @@ pub fn request(model: &Path, out_dir: &Path, effort: Effort) -> FitRequest {
         domain_text: "sphere".to_owned(),
         planes: None,
         validation: None,
+        certificate: None,
         seed: 1,
         command: String::new(),
     }

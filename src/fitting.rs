@@ -1,0 +1,244 @@
+//! The fit itself: from a mesh to a set of baked planes, one line a stage.
+//!
+//! One section where a few planes explain all shadow, or where the user names a number of planes; else as many as the
+//! preset has, each with short lists.
+
+use crate::{
+    asset::{self, AssetError},
+    effort::Plan,
+    pipeline::{FitRequest, Purpose, held_out, seed_for},
+    report::Times,
+    scene::Scene,
+};
+use glam::Vec3;
+use rayon::prelude::*;
+use shadowfit_solver::{
+    budget::BudgetOptions,
+    fit::bake,
+    lists::{ListOptions, SectionFit, assign},
+    mesh::Mesh,
+    metrics::{Metrics, measure, measure_tables},
+    pair_table::{PairTable, SampleSize},
+    plane::BakedSet,
+    receivers::{ReceiverOptions, sample},
+    search::{Found, SearchOptions, Verdict, place, search},
+    sections,
+    visibility::{Pairs, trace},
+};
+use std::{collections::HashMap, time::Instant};
+
+/// Receivers, exposure rays and lights by which a model is divided.
+const PILOT: (usize, usize, usize) = (16_384, 16, 64);
+
+/// A model is left whole if as many planes as a list may have leave this share of its shadow unexplained: the border
+/// of a texture alone costs half of that.
+const WHOLE_ERROR: f64 = 0.03;
+
+/// Receivers and lights on which `--max-error` is decided.
+pub(crate) const JUDGING: [usize; 2] = [12_000, 211];
+
+/// `--max-error` aims this much lower: the judging pairs and the held-out ones are different samples.
+const TARGET_MARGIN: f64 = 0.98;
+
+/// Smallest gain of a plane while an error is to be reached: below it planes fit noise.
+const TARGET_MIN_GAIN: f64 = 5e-4;
+
+/// Most planes where `--max-error` is given without `--max-planes`.
+const TARGET_MAX_PLANES: usize = 64;
+
+/// Pairs on which the sets of the curve and of `--max-error` are baked, and their lights.
+const CURVE_SAMPLE: SampleSize = SampleSize { lights: 1024, pairs: 1_500_000 };
+
+/// Shares of the textures' bytes at which a divided model's error is told.
+const CURVE_BUDGETS: [f64; 4] = [1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0];
+
+/// What search and bake leave behind.
+pub(crate) struct Fitted {
+    pub set: BakedSet,
+    /// The section of each triangle of the scene.
+    pub section_of: Vec<u32>,
+    /// Planes as searched, all sections in turn.
+    pub searched: Vec<Found>,
+    /// Smaller sets, each with the seconds into the search at which it was found.
+    pub smaller: Vec<(BakedSet, f64)>,
+    /// On the pairs that decided the planes.
+    pub training: Metrics,
+}
+
+/// Everything a fit works on.
+struct Fit<'a> {
+    request: &'a FitRequest,
+    mesh: &'a Mesh,
+    plan: Plan,
+    directions: Vec<Vec3>,
+    tables: Vec<PairTable>,
+    /// Weight of all blocked pairs.
+    shadow: f64,
+}
+
+/// Fits planes to a mesh; `times` gets the seconds of its stages.
+pub(crate) fn fit(
+    request: &FitRequest,
+    (scene, mesh): (&Scene, &Mesh),
+    progress: &mut dyn FnMut(String),
+    times: &mut Times,
+) -> Result<Fitted, AssetError> {
+    let start = Instant::now();
+    progress("looking at the model".to_string());
+    let (receivers, rays, lights) = PILOT;
+    let seed = seed_for(request, Purpose::Pilot);
+    let pilot = sample(mesh, &ReceiverOptions { count: receivers, exposure_rays: rays, seed });
+    let pilot_pairs = trace(mesh, &pilot, &request.domain.directions(lights, seed), request.domain.solid_angle());
+    let plan = plan(request, mesh, &pilot_pairs);
+    let section_of = sections::divide(mesh, &units(scene, mesh), (&pilot, &pilot_pairs), plan.sections);
+    times.receivers = start.elapsed().as_secs_f64();
+
+    progress("tracing the reference".to_string());
+    let directions = request.domain.directions(plan.directions, seed_for(request, Purpose::Directions));
+    let tables = sections::trace(mesh, &section_of, &directions, request.domain, &plan.trace);
+    let shadow = tables.iter().map(|table| table.weights().0).sum();
+    times.reference = start.elapsed().as_secs_f64() - times.receivers;
+
+    let fit = Fit { request, mesh, plan, directions, tables, shadow };
+    let (searched, smaller) = fit.search(progress)?;
+    times.search = start.elapsed().as_secs_f64() - times.receivers - times.reference;
+
+    progress(format!("baking {} planes", searched.iter().map(Vec::len).sum::<usize>()));
+    let (set, smaller) = fit.bake(&searched, smaller);
+    times.bake = start.elapsed().as_secs_f64() - times.receivers - times.reference - times.search;
+    let training = measure_tables(&set, &fit.tables);
+    let section_of = section_of_scene(scene, mesh, &section_of);
+    Ok(Fitted { set, section_of, searched: searched.concat(), smaller, training })
+}
+
+/// The preset's numbers with the user's; one section where a quick search shows that it will do.
+fn plan(request: &FitRequest, mesh: &Mesh, pilot: &Pairs) -> Plan {
+    let effort = &request.effort;
+    let counted = request.max_planes.is_some() || request.max_error.is_some() || request.planes.is_some();
+    let listed = request.max_lookups.is_some() || request.texture_budget.is_some();
+    let whole = match request.sections {
+        Some(count) => count == 1,
+        None => pilot.shadow_weight <= 0.0 || (counted && !listed) || is_simple(request, mesh, pilot),
+    };
+    let mut plan = if whole { effort.whole } else { effort.divided };
+    plan.sections = request.sections.unwrap_or(plan.sections);
+    plan.trace.seed = seed_for(request, Purpose::Training);
+    plan.search.seed = request.seed;
+    if request.max_error.is_some() {
+        (plan.min_gain, plan.search.max_planes) = (TARGET_MIN_GAIN, TARGET_MAX_PLANES);
+    }
+    if let Some(planes) = request.max_planes {
+        plan.budget.max_planes = planes;
+        plan.search.max_planes = if whole { planes } else { plan.search.max_planes.min(planes) };
+    }
+    plan.lists.max_lookups = request.max_lookups.unwrap_or(plan.lists.max_lookups);
+    plan.budget.bytes = request.texture_budget.unwrap_or(plan.budget.bytes);
+    plan.budget.texture_size = request.texture_size.unwrap_or(plan.budget.texture_size);
+    plan
+}
+
+/// Do as many planes as a list may have explain nearly all shadow of the first look?
+fn is_simple(request: &FitRequest, mesh: &Mesh, pilot: &Pairs) -> bool {
+    let plan = request.effort.whole;
+    let max_planes = request.max_lookups.unwrap_or(request.effort.divided.lists.max_lookups);
+    let directions = request.domain.directions(PILOT.2 / 4, request.seed);
+    let table = PairTable::new(pilot, &directions);
+    let options = SearchOptions { max_planes, seed: request.seed, replace_rounds: 0, ..plan.search };
+    let found = search(mesh, &table, &options, plan.min_gain * pilot.shadow_weight, &mut |_| Verdict::Continue);
+    let fits = [assign(&table, &found.planes, &ListOptions { max_lookups: max_planes, grid: 128, ..plan.lists })];
+    let set = bake(&fits, &directions, pilot.shadow_weight, &plan.budget);
+    measure_tables(&set, &[table]).shadow_error < WHOLE_ERROR
+}
+
+/// For each triangle of the mesh a number that its copies in the scene share.
+fn units(scene: &Scene, mesh: &Mesh) -> Vec<u32> {
+    let mut numbers = HashMap::new();
+    let mut number = |source: &u32| {
+        let next = numbers.len() as u32;
+        *numbers.entry(scene.origins[*source as usize]).or_insert(next)
+    };
+    mesh.source.iter().map(&mut number).collect()
+}
+
+/// The section of each triangle of the scene; triangles that the mesh leaves out have that of their copies, or 0.
+fn section_of_scene(scene: &Scene, mesh: &Mesh, section_of: &[u32]) -> Vec<u32> {
+    let by_origin: HashMap<_, u32> = mesh
+        .source
+        .iter()
+        .zip(section_of)
+        .map(|(source, section)| (scene.origins[*source as usize], *section))
+        .collect();
+    scene.origins.iter().map(|origin| by_origin.get(origin).copied().unwrap_or(0)).collect()
+}
+
+impl Fit<'_> {
+    /// Planes per section, and the smaller sets of a whole model.
+    fn search(&self, progress: &mut dyn FnMut(String)) -> Result<(Vec<Vec<Found>>, Vec<(BakedSet, f64)>), AssetError> {
+        let Plan { search: options, min_gain, .. } = &self.plan;
+        if let Some(path) = &self.request.planes {
+            let rectangles = asset::read_plane_file(path)?;
+            let planes: Vec<_> =
+                rectangles.iter().map(|given| (given.rectangle.in_unit_space(&self.mesh.frame), given.side)).collect();
+            return Ok((vec![place(self.mesh, &self.tables[0], &planes, options)], Vec::new()));
+        }
+        if let [table] = &self.tables[..] {
+            return Ok(self.search_whole(table, progress));
+        }
+        progress(format!("searching {} sections", self.tables.len()));
+        let search = |table: &PairTable| {
+            search(self.mesh, table, options, min_gain * self.shadow, &mut |_| Verdict::Continue).planes
+        };
+        Ok((self.tables.par_iter().map(search).collect(), Vec::new()))
+    }
+
+    fn search_whole(
+        &self,
+        table: &PairTable,
+        progress: &mut dyn FnMut(String),
+    ) -> (Vec<Vec<Found>>, Vec<(BakedSet, f64)>) {
+        let start = Instant::now();
+        let sample = table.sample(CURVE_SAMPLE, self.request.seed);
+        let quick = ListOptions { rounds: 1, ..self.plan.lists };
+        let bake_prefix = |planes: &[Found]| {
+            bake(&[assign(&sample, planes, &quick)], &self.directions, self.shadow, &self.plan.budget)
+        };
+        let judging =
+            self.request.max_error.map(|target| (target, held_out(self.mesh, self.request, JUDGING, Purpose::Judging)));
+        let mut found_at_s = Vec::new();
+        let mut judge = |planes: &[Found]| {
+            progress(format!("searching: {} planes", planes.len()));
+            found_at_s.push(start.elapsed().as_secs_f64());
+            match &judging {
+                Some((target, (pairs, receivers))) => {
+                    let everywhere = vec![0; receivers.points.len()];
+                    let error = measure(&bake_prefix(planes), pairs, &everywhere).shadow_error;
+                    if error <= target * TARGET_MARGIN { Verdict::Enough } else { Verdict::Continue }
+                }
+                None => Verdict::Continue,
+            }
+        };
+        let min_gain = self.plan.min_gain * self.shadow;
+        let selection = search(self.mesh, table, &self.plan.search, min_gain, &mut judge);
+        let count = selection.planes.len();
+        let prefixes: Vec<BakedSet> = (1..count).into_par_iter().map(|k| bake_prefix(&selection.greedy[..k])).collect();
+        (vec![selection.planes], prefixes.into_iter().zip(found_at_s).collect())
+    }
+
+    /// The set, and sets of fewer planes or bytes.
+    fn bake(&self, searched: &[Vec<Found>], mut smaller: Vec<(BakedSet, f64)>) -> (BakedSet, Vec<(BakedSet, f64)>) {
+        let fits: Vec<SectionFit> = self
+            .tables
+            .par_iter()
+            .zip(searched)
+            .map(|(table, planes)| assign(table, planes, &self.plan.lists))
+            .collect();
+        let within = |budget: &BudgetOptions| bake(&fits, &self.directions, self.shadow, budget);
+        let set = within(&self.plan.budget);
+        if self.tables.len() > 1 {
+            let bytes: usize = set.planes.iter().map(|baked| baked.texture.texels.len()).sum();
+            let budget = |share: f64| BudgetOptions { bytes: (bytes as f64 * share) as usize, ..self.plan.budget };
+            smaller = CURVE_BUDGETS.iter().map(|share| (within(&budget(*share)), 0.0)).collect();
+        }
+        (set, smaller)
+    }
+}
