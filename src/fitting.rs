@@ -14,7 +14,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 use shadowfit_solver::{
     budget::BudgetOptions,
-    fit::bake,
+    fit::{bake, bake_within},
     lists::{ListOptions, SectionFit, assign},
     mesh::Mesh,
     metrics::{Metrics, measure, measure_tables},
@@ -49,8 +49,8 @@ const TARGET_MAX_PLANES: usize = 64;
 /// Pairs on which the sets of the curve and of `--max-error` are baked, and their lights.
 const CURVE_SAMPLE: SampleSize = SampleSize { lights: 1024, pairs: 1_500_000 };
 
-/// Shares of the textures' bytes at which a divided model's error is told.
-const CURVE_BUDGETS: [f64; 4] = [1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0];
+/// Shares of the budget at which a divided model's error is told.
+const CURVE_BUDGETS: [f64; 4] = [1.0 / 4.0, 1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0];
 
 /// What search and bake leave behind.
 pub(crate) struct Fitted {
@@ -232,13 +232,14 @@ impl Fit<'_> {
             .zip(searched)
             .map(|(table, planes)| assign(table, planes, &self.plan.lists))
             .collect();
-        let within = |budget: &BudgetOptions| bake(&fits, &self.directions, self.shadow, budget);
-        let set = within(&self.plan.budget);
-        if self.tables.len() > 1 {
-            let bytes: usize = set.planes.iter().map(|baked| baked.texture.texels.len()).sum();
-            let budget = |share: f64| BudgetOptions { bytes: (bytes as f64 * share) as usize, ..self.plan.budget };
-            smaller = CURVE_BUDGETS.iter().map(|share| (within(&budget(*share)), 0.0)).collect();
-        }
+        let divided = self.tables.len() > 1;
+        let shares = [1.0].into_iter().chain(CURVE_BUDGETS.into_iter().filter(|_| divided));
+        let budgets: Vec<BudgetOptions> = shares
+            .map(|share| BudgetOptions { bytes: (self.plan.budget.bytes as f64 * share) as usize, ..self.plan.budget })
+            .collect();
+        let mut sets = bake_within(&fits, &self.directions, self.shadow, &budgets);
+        let set = sets.remove(0);
+        smaller.extend(sets.into_iter().rev().map(|set| (set, 0.0)));
         (set, smaller)
     }
 }

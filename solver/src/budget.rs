@@ -37,19 +37,28 @@ const STEPS: usize = 4;
 const PRICE_STEPS: usize = 60;
 
 /// One size that a plane may have.
-#[derive(Clone, Copy, Debug)]
-struct Offer {
-    size: (usize, usize),
-    bytes: usize,
-    gain: f64,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Offer {
+    /// Width and height, texels.
+    pub size: (usize, usize),
+    /// What it costs.
+    pub bytes: usize,
+    /// Drop of the weighted error that it brings, decided and counted under different lights.
+    pub gain: f64,
+}
+
+/// What each plane is worth at each size; `bytes` and `byte_gain` have no part in it.
+#[must_use]
+pub fn offers(planes: &[&VotedPlane], options: &BudgetOptions) -> Vec<Vec<Offer>> {
+    let mut offers: Vec<Vec<Offer>> = planes.par_iter().map(|plane| offers_of(plane, options)).collect();
+    keep_best(&mut offers, options.max_planes);
+    offers
 }
 
 /// Width and height of each plane's texture, the open ring included; `None`: dropped. `shadow_weight` is that of all
 /// pairs.
 #[must_use]
-pub fn sizes(planes: &[&VotedPlane], shadow_weight: f64, options: &BudgetOptions) -> Vec<Option<(usize, usize)>> {
-    let mut offers: Vec<Vec<Offer>> = planes.par_iter().map(|plane| offers(plane, options)).collect();
-    keep_best(&mut offers, options.max_planes);
+pub fn sizes(offers: &[Vec<Offer>], shadow_weight: f64, options: &BudgetOptions) -> Vec<Option<(usize, usize)>> {
     let choose = |price: f64| -> Vec<Option<Offer>> {
         let worth = |offer: &&Offer| offer.gain - price * offer.bytes as f64;
         let best = |offers: &Vec<Offer>| {
@@ -86,7 +95,7 @@ fn keep_best(offers: &mut [Vec<Offer>], count: usize) {
 }
 
 /// What a plane is worth at each size.
-fn offers(plane: &VotedPlane, options: &BudgetOptions) -> Vec<Offer> {
+fn offers_of(plane: &VotedPlane, options: &BudgetOptions) -> Vec<Offer> {
     let grid = |fold: usize| VoteGrid { votes: &plane.votes[fold], width: plane.width, height: plane.height };
     let shapes = [0, 1].map(|fold| VotedShape::new(grid(fold), options.smoothing));
     let most = options.texture_size.min(TRIED[TRIED.len() - 1]).max(TRIED[0]);

@@ -16,12 +16,37 @@ use rayon::prelude::*;
 /// lists.
 #[must_use]
 pub fn bake(fits: &[SectionFit], directions: &[Vec3], shadow_weight: f64, options: &BudgetOptions) -> BakedSet {
+    bake_within(fits, directions, shadow_weight, &[*options]).remove(0)
+}
+
+/// The same for several budgets that differ in their bytes only.
+#[must_use]
+pub fn bake_within(
+    fits: &[SectionFit],
+    directions: &[Vec3],
+    shadow_weight: f64,
+    options: &[BudgetOptions],
+) -> Vec<BakedSet> {
+    let Some(first) = options.first() else { return Vec::new() };
     let planes: Vec<&VotedPlane> = fits.iter().flat_map(|fit| &fit.planes).collect();
-    let sizes = budget::sizes(&planes, shadow_weight, options);
-    let bake_one = |(plane, size): (&&VotedPlane, &Option<(usize, usize)>)| {
-        size.and_then(|size| baked(plane, size, options.smoothing))
+    let offers = budget::offers(&planes, first);
+    let bake = |options: &BudgetOptions| {
+        let sizes = budget::sizes(&offers, shadow_weight, options);
+        bake_sizes(fits, &planes, &sizes, (directions, options.smoothing))
     };
-    let baked: Vec<Option<BakedPlane>> = planes.par_iter().zip(&sizes).map(bake_one).collect();
+    options.iter().map(bake).collect()
+}
+
+/// Bakes planes to textures of given sizes.
+fn bake_sizes(
+    fits: &[SectionFit],
+    planes: &[&VotedPlane],
+    sizes: &[Option<(usize, usize)>],
+    (directions, smoothing): (&[Vec3], usize),
+) -> BakedSet {
+    let bake_one =
+        |(plane, size): (&&VotedPlane, &Option<(usize, usize)>)| size.and_then(|size| baked(plane, size, smoothing));
+    let baked: Vec<Option<BakedPlane>> = planes.par_iter().zip(sizes).map(bake_one).collect();
     let mut set = BakedSet::default();
     let mut index: Vec<Option<u32>> = Vec::with_capacity(baked.len());
     for plane in baked {

@@ -15,10 +15,11 @@
 
 use crate::{
     mesh::{Mesh, ray_origin},
-    pair_table::{PairTable, SPARE, SampleSize},
+    pair_table::{LightRows, PairTable, SPARE, SampleSize},
     plane::{PlacedPlane, ShadowPlane, Side},
     rectangle::{around_section, enlarged, shifted, tight_around},
     sampling::{hash, uniform},
+    shade::CastingPlane,
     votes::smoothed,
 };
 use glam::Vec3;
@@ -350,10 +351,11 @@ impl<'a> Search<'a> {
     /// Which pairs of the whole table the plane covers.
     fn covered_by(&self, placed: &PlacedPlane, cast: &Cast) -> Vec<bool> {
         let n = self.options.texels;
-        let of_light = |rows: &crate::pair_table::LightRows| {
+        let casting = CastingPlane::new(&placed.plane, placed.side);
+        let of_light = |rows: &LightRows| {
             let mut texels = vec![0u16; rows.end - rows.start];
             if cast.window[rows.direction] {
-                self.table.crossings_of_light(rows, placed, (n, n), &mut texels);
+                self.table.crossings_of_light(rows, (&casting, placed.bias), (n, n), &mut texels);
                 texels.iter().map(|&texel| cast.blocked[texel as usize] != 0).collect()
             } else {
                 vec![false; texels.len()]

@@ -34,26 +34,52 @@ pub fn duals(plane: &ShadowPlane) -> (Vec3, Vec3) {
     (plane.v.cross(n) * inv, n.cross(plane.u) * inv)
 }
 
-/// Rows of `plane` under a light in direction `l`, or `None` where it casts nothing: edge-on, without area, or
-/// all its receivers are on the side that `side` leaves out (a receiver is in front when the light is behind).
+/// What the rows of a plane have in common under all lights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CastingPlane {
+    side: Side,
+    normal: Vec3,
+    dual_a: Vec3,
+    dual_b: Vec3,
+    /// The origin's dot products with the three vectors.
+    origin: [f32; 3],
+}
+
+impl CastingPlane {
+    /// Prepares `plane` for [`CastingPlane::rows`].
+    #[must_use]
+    pub fn new(plane: &ShadowPlane, side: Side) -> Self {
+        let (normal, (dual_a, dual_b)) = (plane.normal(), duals(plane));
+        let origin = [normal, dual_a, dual_b].map(|v| v.dot(plane.origin));
+        Self { side, normal, dual_a, dual_b, origin }
+    }
+
+    /// Rows under a light in direction `l`, or `None` where the plane casts nothing: edge-on, without area, or all its
+    /// receivers are on the side that `side` leaves out (a receiver is in front when the light is behind).
+    #[must_use]
+    pub fn rows(&self, l: Vec3) -> Option<PlaneRows> {
+        let n_dot_l = self.normal.dot(l);
+        let served = match self.side {
+            Side::Both => true,
+            Side::Front => n_dot_l < 0.0,
+            Side::Back => n_dot_l > 0.0,
+        };
+        // The comparison is written so that NaN (a broken plane or light) casts nothing.
+        if !(served && n_dot_l.abs() >= EDGE_ON) {
+            return None;
+        }
+        // s(p) = (n.o - n.p) / n.l; a(p) = (p - o).dual_a + s(p) l.dual_a.
+        let [n_dot_o, a_dot_o, b_dot_o] = self.origin;
+        let s = (-self.normal / n_dot_l).extend(n_dot_o / n_dot_l);
+        let row = |dual: Vec3, dual_dot_o: f32| dual.extend(-dual_dot_o) + s * l.dot(dual);
+        Some(PlaneRows { a: row(self.dual_a, a_dot_o), b: row(self.dual_b, b_dot_o), s })
+    }
+}
+
+/// Rows of `plane` under a light in direction `l`; see [`CastingPlane::rows`].
 #[must_use]
 pub fn plane_rows(plane: &ShadowPlane, side: Side, l: Vec3) -> Option<PlaneRows> {
-    let n = plane.normal();
-    let n_dot_l = n.dot(l);
-    let served = match side {
-        Side::Both => true,
-        Side::Front => n_dot_l < 0.0,
-        Side::Back => n_dot_l > 0.0,
-    };
-    // The comparison is written so that NaN (a broken plane or light) casts nothing.
-    if !(served && n_dot_l.abs() >= EDGE_ON) {
-        return None;
-    }
-    let (dual_a, dual_b) = duals(plane);
-    // s(p) = (n.o - n.p) / n.l; a(p) = (p - o).dual_a + s(p) l.dual_a.
-    let s = (-n / n_dot_l).extend(n.dot(plane.origin) / n_dot_l);
-    let row = |dual: Vec3| dual.extend(-plane.origin.dot(dual)) + s * l.dot(dual);
-    Some(PlaneRows { a: row(dual_a), b: row(dual_b), s })
+    CastingPlane::new(plane, side).rows(l)
 }
 
 /// Where the ray from `p` crosses the plane: `(a, b)` if that is on the rectangle and beyond `bias`.
