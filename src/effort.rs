@@ -42,15 +42,20 @@ impl Effort {
         let Self { whole, divided } = Self::balanced();
         Self {
             whole: Plan {
-                trace: TraceOptions { pairs: 2_000_000, ..whole.trace },
+                trace: TraceOptions { pairs: 1_000_000, lights: 512, exposure_rays: 16, ..whole.trace },
+                directions: 64,
                 search: SearchOptions {
-                    proposals: 400,
+                    proposals: 300,
+                    screening: SampleSize { lights: 64, pairs: 20_000 },
+                    screening_texels: 32,
                     finalists: 12,
+                    refined: 2,
                     scoring: SampleSize { lights: 128, pairs: 60_000 },
                     texels: 64,
-                    replace_rounds: 0,
+                    refine_steps: 4,
                     ..whole.search
                 },
+                lists: ListOptions { grid: 160, rounds: 2, ..whole.lists },
                 ..whole
             },
             divided: Plan {
@@ -99,7 +104,7 @@ impl Effort {
         };
         let divided = Plan {
             sections: 96,
-            trace: TraceOptions { pairs: 12_000_000, lights: 2048, stride: 4, exposure_rays: 16, seed: 0 },
+            trace: TraceOptions { pairs: 14_000_000, lights: 2048, stride: 4, exposure_rays: 16, seed: 0 },
             directions: 192,
             search: SearchOptions {
                 max_planes: 16,
@@ -127,13 +132,14 @@ impl Effort {
         let Self { whole, divided } = Self::balanced();
         Self {
             whole: Plan {
-                trace: TraceOptions { pairs: 12_000_000, lights: 2048, ..whole.trace },
+                trace: TraceOptions { pairs: 8_000_000, lights: 2048, ..whole.trace },
                 search: SearchOptions {
-                    proposals: 2000,
+                    proposals: 1600,
+                    screening: SampleSize { lights: 128, pairs: 60_000 },
                     finalists: 48,
                     refined: 6,
-                    scoring: SampleSize { lights: 1024, pairs: 400_000 },
-                    replace_rounds: 3,
+                    scoring: SampleSize { lights: 512, pairs: 400_000 },
+                    replace_rounds: 2,
                     ..whole.search
                 },
                 ..whole
