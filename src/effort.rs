@@ -53,6 +53,7 @@ impl Effort {
                     scoring: SampleSize { lights: 128, pairs: 60_000 },
                     texels: 64,
                     refine_steps: 4,
+                    replace_rounds: 0,
                     ..whole.search
                 },
                 lists: ListOptions { grid: 160, rounds: 2, ..whole.lists },
@@ -93,13 +94,13 @@ impl Effort {
                 seed: 0,
             },
             min_gain: 0.002,
-            lists: ListOptions { max_lookups: usize::MAX, grid: 255, rounds: 3, smoothing: 2 },
+            lists: ListOptions { max_lookups: usize::MAX, grid: 255, rounds: 3, smoothing: 1 },
             budget: BudgetOptions {
                 max_planes: usize::MAX,
                 bytes: TEXTURE_BUDGET,
                 texture_size: 128,
                 byte_gain: 2e-8,
-                smoothing: 2,
+                smoothing: 1,
             },
         };
         let divided = Plan {

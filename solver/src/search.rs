@@ -28,7 +28,7 @@ use rayon::prelude::*;
 /// How hard to search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchOptions {
-    /// At most this many planes.
+    /// At most this many planes, up to 255.
     pub max_planes: usize,
     /// Planes that are screened for each pick.
     pub proposals: usize,
@@ -163,6 +163,7 @@ pub fn search(
             break;
         }
     }
+    search.drop_unpaid(&mut planes, min_gain);
     if verdict == Verdict::Enough {
         search.shrink(&mut planes, judge);
     }
@@ -180,7 +181,7 @@ impl<'a> Search<'a> {
     fn greedy(&self, min_gain: f64, judge: &mut dyn FnMut(&[Found]) -> Verdict) -> (Vec<Found>, Verdict) {
         let mut planes = Vec::new();
         let mut covered = vec![false; self.table.len()];
-        while planes.len() < self.options.max_planes {
+        while planes.len() < self.options.max_planes.min(usize::from(u8::MAX)) {
             let open = self.table.filtered(|i| !covered[i]);
             let seed = hash(self.options.seed, planes.len() as u64);
             let Some((found, cast)) = self.best_plane(&open, seed, None) else { break };
@@ -201,15 +202,20 @@ impl<'a> Search<'a> {
         let mut scratch = Scratch::default();
         let mut exchanges = 0;
         let mut covers = self.covers(planes);
+        let mut counts = self.counts(&covers);
         for k in 0..planes.len() {
-            let open = self.table.filtered(|i| !covers.iter().enumerate().any(|(j, cover)| j != k && cover[i]));
+            let open = self.table.filtered(|i| counts[i] == u8::from(covers[k][i]));
             let seed = hash(self.options.seed ^ 0x5EED, (round * planes.len() + k) as u64);
             let scoring = open.sample(self.options.scoring, seed);
             let kept = Found { gain: self.gain(&scoring, &planes[k].placed, &mut scratch), ..planes[k] };
             let found = self.best_plane(&open, seed, Some(&planes[k]));
             if let Some((found, cast)) = found.filter(|(found, _)| found.gain > kept.gain * (1.0 + REPLACE_MARGIN)) {
                 exchanges += 1;
-                covers[k] = self.covered_by(&found.placed, &cast);
+                let cover = self.covered_by(&found.placed, &cast);
+                for ((count, before), after) in counts.iter_mut().zip(&covers[k]).zip(&cover) {
+                    *count = *count + u8::from(*after) - u8::from(*before);
+                }
+                covers[k] = cover;
                 planes[k] = found;
             } else {
                 planes[k] = kept;
@@ -218,12 +224,21 @@ impl<'a> Search<'a> {
         exchanges
     }
 
+    /// Drops planes that gain too little given the others, the least useful first.
+    fn drop_unpaid(&self, planes: &mut Vec<Found>, min_gain: f64) {
+        while let Some((least, gain)) = least(&self.gains(planes)) {
+            if gain >= min_gain {
+                break;
+            }
+            planes.remove(least);
+        }
+    }
+
     /// Takes the least useful plane out and lets the others move, as long as `judge` finds the rest good enough.
     fn shrink(&self, planes: &mut Vec<Found>, judge: &mut dyn FnMut(&[Found]) -> Verdict) {
         while planes.len() > 1 {
             let mut fewer = planes.clone();
-            let gains = self.gains(&fewer);
-            let Some(least) = (0..gains.len()).min_by(|&a, &b| gains[a].total_cmp(&gains[b])) else { break };
+            let Some((least, _)) = least(&self.gains(&fewer)) else { break };
             fewer.remove(least);
             self.replace_round(&mut fewer, planes.len());
             if judge(&fewer) == Verdict::Continue {
@@ -236,11 +251,21 @@ impl<'a> Search<'a> {
     /// What each plane gains given the others.
     fn gains(&self, planes: &[Found]) -> Vec<f64> {
         let covers = self.covers(planes);
+        let counts = self.counts(&covers);
         let gain = |k: usize| {
-            let open = self.table.filtered(|i| !covers.iter().enumerate().any(|(j, cover)| j != k && cover[i]));
+            let open = self.table.filtered(|i| counts[i] == u8::from(covers[k][i]));
             self.gain(&open.sample(self.options.scoring, self.options.seed), &planes[k].placed, &mut Scratch::default())
         };
-        (0..planes.len()).map(gain).collect()
+        (0..planes.len()).into_par_iter().map(gain).collect()
+    }
+
+    /// How many planes cover each pair. No more than 255 planes are searched together.
+    fn counts(&self, covers: &[Vec<bool>]) -> Vec<u8> {
+        let mut counts = vec![0u8; self.table.len()];
+        for cover in covers {
+            counts.iter_mut().zip(cover).for_each(|(count, covered)| *count += u8::from(*covered));
+        }
+        counts
     }
 
     /// Which pairs each plane covers, in the order of the planes: each decided by what those before leave open.
@@ -422,6 +447,11 @@ pub fn place(mesh: &Mesh, table: &PairTable, planes: &[(ShadowPlane, Side)], opt
 /// A plane as a search starts with it.
 fn placed_anew(plane: ShadowPlane) -> PlacedPlane {
     PlacedPlane { plane, side: Side::Both, bias: BIAS }
+}
+
+/// Index of the smallest number, and that number.
+fn least(gains: &[f64]) -> Option<(usize, f64)> {
+    gains.iter().copied().enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Planes proposed through one blocker.
