@@ -19,7 +19,7 @@ use crate::{
     plane::{PlacedPlane, ShadowPlane, Side},
     rectangle::{around_section, enlarged, shifted, tight_around},
     sampling::{hash, uniform},
-    votes::smoothed,
+    smoothing::smoothed,
 };
 use glam::Vec3;
 use rayon::prelude::*;
