@@ -146,12 +146,7 @@ fn first_pool(
 }
 
 /// Up to `count` planes that gain `least` each.
-fn searched(
-    (mesh, table): (&Mesh, &PairTable),
-    options: &SearchOptions,
-    count: usize,
-    least: f64,
-) -> Vec<PlacedPlane> {
+fn searched((mesh, table): (&Mesh, &PairTable), options: &SearchOptions, count: usize, least: f64) -> Vec<PlacedPlane> {
     let options = SearchOptions { max_planes: count, replace_rounds: 0, ..*options };
     let selection = search(mesh, table, &options, least.max(f64::MIN_POSITIVE), &mut |_| Verdict::Continue);
     selection.planes.iter().map(|found| found.placed).collect()
