@@ -68,8 +68,9 @@ struct FitArgs {
     /// Frames to render and compare: none, short (4 views x 2 lights, 512 px) or full (8 x 8, 1024 px).
     #[arg(long, value_enum, default_value_t = Validate::Short)]
     validate: Validate,
-    /// Prove how far from the best planes of a pool the ones found are (half a minute more).
-    #[arg(long)]
+    /// Prove how far the planes found are from the best of a pool, all of them read everywhere (half a minute more).
+    /// The model is left whole.
+    #[arg(long, conflicts_with = "max_lookups")]
     certificate: bool,
     /// Seed of all sampling: the same seed gives the same bytes.
     #[arg(long, value_name = "S", default_value_t = 1)]
@@ -200,6 +201,9 @@ pub fn run(cli: Cli, command: String) -> Result<(), CliError> {
 
 fn fit(args: FitArgs, command: String) -> Result<(), CliError> {
     let domain = args.lights.parse().map_err(|error| CliError::Usage(format!("--lights: {error}")))?;
+    if let Some(count) = args.sections.filter(|count| args.certificate && *count > 1) {
+        return Err(CliError::Usage(format!("--certificate is about a whole model: --sections {count} divides it")));
+    }
     if let Some(threads) = args.threads {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
         pool.map_err(|error| CliError::Usage(format!("--threads: {error}")))?;

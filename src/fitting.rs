@@ -14,12 +14,14 @@ use glam::Vec3;
 use rayon::prelude::*;
 use shadowfit_solver::{
     budget::BudgetOptions,
+    certificate::Certificate,
+    columns::{ColumnOptions, certify_found},
     fit::{bake, bake_within},
     lists::{ListOptions, SectionFit, assign},
     mesh::Mesh,
     metrics::{Metrics, measure, measure_tables},
     pair_table::{PairTable, SampleSize},
-    plane::BakedSet,
+    plane::{BakedSet, PlacedPlane},
     receivers::{ReceiverOptions, sample},
     search::{Found, SearchOptions, Verdict, place, search},
     sections,
@@ -57,12 +59,12 @@ pub(crate) struct Fitted {
     pub set: BakedSet,
     /// The section of each triangle of the scene.
     pub section_of: Vec<u32>,
-    /// Planes as searched, all sections in turn.
-    pub searched: Vec<Found>,
     /// Smaller sets, each with the seconds into the search at which it was found.
     pub smaller: Vec<(BakedSet, f64)>,
     /// On the pairs that decided the planes.
     pub training: Metrics,
+    /// Where asked for.
+    pub certificate: Option<Certificate>,
 }
 
 /// Everything a fit works on.
@@ -107,8 +109,15 @@ pub(crate) fn fit(
     let (set, smaller) = fit.bake(&searched, smaller);
     times.bake = start.elapsed().as_secs_f64() - times.receivers - times.reference - times.search;
     let training = measure_tables(&set, &fit.tables);
+
+    let proving = Instant::now();
+    let certificate = request.certificate.as_ref().map(|options| {
+        progress("proving a bound".to_string());
+        fit.certify(&searched[0], options)
+    });
+    times.certificate = proving.elapsed().as_secs_f64();
     let section_of = section_of_scene(scene, mesh, &section_of);
-    Ok(Fitted { set, section_of, searched: searched.concat(), smaller, training })
+    Ok(Fitted { set, section_of, smaller, training, certificate })
 }
 
 /// The preset's numbers with the user's; one section where a quick search shows that it will do.
@@ -116,9 +125,10 @@ fn plan(request: &FitRequest, mesh: &Mesh, pilot: &Pairs) -> Plan {
     let effort = &request.effort;
     let counted = request.max_planes.is_some() || request.max_error.is_some() || request.planes.is_some();
     let listed = request.max_lookups.is_some() || request.texture_budget.is_some();
+    let one_list = request.certificate.is_some() || (counted && !listed);
     let whole = match request.sections {
         Some(count) => count == 1,
-        None => pilot.shadow_weight <= 0.0 || (counted && !listed) || is_simple(request, mesh, pilot),
+        None => pilot.shadow_weight <= 0.0 || one_list || is_simple(request, mesh, pilot),
     };
     let mut plan = if whole { effort.whole } else { effort.divided };
     plan.sections = request.sections.unwrap_or(plan.sections);
@@ -222,6 +232,12 @@ impl Fit<'_> {
         let count = selection.planes.len();
         let prefixes: Vec<BakedSet> = (1..count).into_par_iter().map(|k| bake_prefix(&selection.greedy[..k])).collect();
         (vec![selection.planes], prefixes.into_iter().zip(found_at_s).collect())
+    }
+
+    /// How far the planes of a whole model are from the best ones of a pool, all read everywhere.
+    fn certify(&self, searched: &[Found], options: &ColumnOptions) -> Certificate {
+        let planes: Vec<PlacedPlane> = searched.iter().map(|found| found.placed).collect();
+        certify_found((self.mesh, &self.tables[0]), &planes, &self.plan.search, options)
     }
 
     /// The set, and sets of fewer planes or bytes.

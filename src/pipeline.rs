@@ -11,18 +11,14 @@ use crate::{
 };
 use glam::{DVec3, Vec3};
 use shadowfit_solver::{
-    candidates::{CandidateOptions, generate},
-    certificate::Certificate,
-    columns::{ColumnOptions, certify_found},
+    columns::ColumnOptions,
     lights::LightDomain,
     mesh::{Mesh, MeshError},
     metrics::{Metrics, measure},
     plane::BakedSet,
     receivers::{ReceiverOptions, Receivers, sample},
     sampling::hash,
-    selection::SelectionOptions,
     visibility::{Pairs, trace},
-    votes::Mask,
 };
 use std::{
     io::Cursor,
@@ -36,9 +32,6 @@ const EXPOSURE_RAYS: usize = 64;
 /// Held-out receivers and lights: other numbers than any preset trains on, so that the lattices differ too.
 const HELD_OUT: [usize; 2] = [24_000, 307];
 
-/// Receivers and lights of the pairs that a certificate is about.
-const CERTIFIED: [usize; 2] = [24_576, 160];
-
 /// What a sampling is for: no two share their points.
 #[derive(Clone, Copy)]
 pub(crate) enum Purpose {
@@ -48,7 +41,6 @@ pub(crate) enum Purpose {
     Image,
     Pilot,
     Directions,
-    Certificate,
 }
 
 /// One fit.
@@ -68,7 +60,7 @@ pub struct FitRequest {
     pub sections: Option<usize>,
     /// Most bytes of all textures, where the user names a number.
     pub texture_budget: Option<usize>,
-    /// How to prove a bound; none without.
+    /// How to prove a bound; none without. A model is left whole for it.
     pub certificate: Option<ColumnOptions>,
     /// The fewest planes that reach this held-out error.
     pub max_error: Option<f64>,
@@ -155,8 +147,6 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
 
     let fitted = fit(request, (&scene, &mesh), progress, &mut time_s)?;
     clock.lap();
-    let certificate = certify(request, &mesh, &fitted, progress);
-    time_s.certificate = clock.lap();
 
     progress("writing the asset".to_string());
     let stem = stem_of(&request.model);
@@ -193,7 +183,7 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
         held_out: proof.held_out,
         training: fitted.training,
         image: proof.image,
-        certificate,
+        certificate: fitted.certificate,
         curve: proof.curve,
         time_s,
         peak_memory_bytes: peak_memory_bytes(),
@@ -244,22 +234,6 @@ fn prove(request: &FitRequest, mesh: &Mesh, fitted: &Fitted, written: &Path, sea
 #[must_use]
 pub fn receiver_sections(mesh: &Mesh, receivers: &Receivers, section_of: &[u32]) -> Vec<u32> {
     receivers.triangles.iter().map(|&triangle| section_of[mesh.source[triangle as usize] as usize]).collect()
-}
-
-/// Where asked for: how far from the best planes of a pool, one list for all receivers, the ones found are.
-fn certify(
-    request: &FitRequest,
-    mesh: &Mesh,
-    fitted: &Fitted,
-    progress: &mut dyn FnMut(String),
-) -> Option<Certificate> {
-    let options = request.certificate.as_ref()?;
-    progress("proving a bound".to_string());
-    let (pairs, _) = held_out(mesh, request, CERTIFIED, Purpose::Certificate);
-    let found: Vec<Mask> =
-        fitted.searched.iter().map(|f| Mask::open(f.placed.plane, f.placed.side, f.placed.bias, 1, 1)).collect();
-    let candidates = generate(mesh, &CandidateOptions { seed: request.seed, ..CandidateOptions::default() });
-    Some(certify_found((mesh, &pairs), &found, &candidates, &SelectionOptions::default(), options))
 }
 
 pub(crate) fn seed_for(request: &FitRequest, purpose: Purpose) -> u64 {

@@ -5,14 +5,17 @@
 //! at most one of each family, with *any* binary textures on their grids (see `relaxation` for the proof). Both are
 //! on the same pairs and grids, so the bound is never above the error.
 //!
+//! Each plane is read for every receiver under every light. A set with active lists does not read its planes where
+//! they do harm, and can have a smaller error than the bound.
+//!
 //! What it does not say: a plane outside the pool is not covered, nor is a set with two variants of one family, nor a
-//! finer texture. Pairs may be a sample of all (`votes::thinned`); the statement is then about that sample. Bilinear
+//! finer texture. Pairs may be a sample of all (`PairTable::sample`); the statement is then about that sample. Bilinear
 //! filtering, smoothing and held-out pairs are no part of it.
 
 use crate::{
+    pair_table::PairTable,
     pool::{Instance, PoolPlane},
     relaxation::{Multipliers, Saddle},
-    visibility::Pairs,
 };
 
 /// How hard to try.
@@ -62,13 +65,13 @@ pub struct Certificate {
 /// # Panics
 /// An index is outside the pool, or two found planes belong to one family.
 #[must_use]
-pub fn certify(pairs: &Pairs, pool: &[PoolPlane], found: &[usize], options: &CertificateOptions) -> Certificate {
+pub fn certify(pairs: &PairTable, pool: &[PoolPlane], found: &[usize], options: &CertificateOptions) -> Certificate {
     prove(pairs, pool, found, options).0
 }
 
 /// The certificate with the multipliers that prove it, and the values of the families at these.
 pub(crate) fn prove(
-    pairs: &Pairs,
+    pairs: &PairTable,
     pool: &[PoolPlane],
     found: &[usize],
     options: &CertificateOptions,

@@ -10,7 +10,7 @@
 
 use crate::{
     plane::{Encoding, OccluderTexture, SDF_BORDER},
-    votes::{fill_unvoted, smoothed},
+    smoothing::{fill_unvoted, smoothed},
 };
 
 /// How many texels the byte range spans on either side of a border: fewer, and bilinear interpolation cannot place it;

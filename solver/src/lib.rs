@@ -3,9 +3,7 @@
 //! Deterministic: the same input and seed give the same bytes at any thread count. No files, no GPU, no clock,
 //! no environment, no printing.
 
-pub mod bake;
 pub mod budget;
-pub mod candidates;
 pub mod certificate;
 pub mod columns;
 pub mod field;
@@ -23,7 +21,6 @@ pub mod relaxation;
 pub mod sampling;
 pub mod search;
 pub mod sections;
-pub mod selection;
 pub mod shade;
+pub mod smoothing;
 pub mod visibility;
-pub mod votes;

@@ -11,7 +11,7 @@ use crate::{
     pair_table::{LightRows, MAX_TEXELS, PairTable, SPARE},
     plane::PlacedPlane,
     search::Found,
-    votes::{fill_unvoted, smoothed},
+    smoothing::{fill_unvoted, smoothed},
 };
 use rayon::prelude::*;
 

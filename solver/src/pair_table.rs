@@ -172,6 +172,12 @@ impl PairTable {
         self.picked((0, 1), |i| keep(i).then(|| self.vote[i]))
     }
 
+    /// The pairs for which `vote(pair)` gives one, with that vote.
+    #[must_use]
+    pub fn revoted(&self, vote: impl FnMut(usize) -> Option<f32>) -> Self {
+        self.picked((0, 1), vote)
+    }
+
     /// A sample of about the given size, with votes scaled up to what they stand for. Lit pairs, which are many and
     /// mostly of receivers that nothing ever shadows, are drawn where the decisions are.
     #[must_use]

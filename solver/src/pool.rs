@@ -9,33 +9,22 @@
 //! Not guaranteed: that re-baking or the search end in the best textures or planes; `relaxation` bounds those.
 
 use crate::{
-    plane::{ShadowPlane, Side},
-    visibility::{LightPairs, Pairs},
-    votes::Mask,
+    pair_table::{LightRows, PairTable, SPARE},
+    plane::PlacedPlane,
 };
 use rayon::prelude::*;
 
 /// A plane that may be chosen, with the grid of its binary texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoolPlane {
-    /// Where it lies.
-    pub plane: ShadowPlane,
-    /// Which receivers it serves.
-    pub side: Side,
-    /// A receiver nearer than this along the ray is not shadowed, unit space.
-    pub bias: f32,
+    /// Where it lies and how it casts.
+    pub placed: PlacedPlane,
     /// Texels along u.
     pub width: usize,
-    /// Texels along v.
+    /// Texels along v; at most `pair_table::MAX_TEXELS` of all.
     pub height: usize,
     /// Variants of one plane share this number: at most one of them may be chosen.
     pub family: usize,
-}
-
-impl PoolPlane {
-    fn open(&self) -> Mask {
-        Mask::open(self.plane, self.side, self.bias, self.width, self.height)
-    }
 }
 
 /// Lights per block of pairs, the unit of parallel work. Fixed, so that sums are added in the same order at any
@@ -83,8 +72,11 @@ const NONE: u32 = u32::MAX;
 
 impl Instance {
     /// Who of `pairs` crosses what of `pool`.
+    ///
+    /// # Panics
+    /// A grid of the pool has more than `pair_table::MAX_TEXELS`.
     #[must_use]
-    pub fn new(pairs: &Pairs, pool: &[PoolPlane]) -> Self {
+    pub fn new(pairs: &PairTable, pool: &[PoolPlane]) -> Self {
         let numbered: Vec<(Vec<u32>, u32)> = pool.par_iter().map(|plane| contested(pairs, plane)).collect();
         let mut first_texel = vec![0usize];
         for (_, count) in &numbered {
@@ -101,8 +93,8 @@ impl Instance {
             families[family].push(index);
             family_of.push(family);
         }
-        let block = |lights: &[LightPairs]| {
-            let mut block = block(lights, pool, &numbered, &first_texel);
+        let block = |lights: &[LightRows]| {
+            let mut block = block((pairs, lights), pool, &numbered, &first_texel);
             block.share_lit(&families);
             block
         };
@@ -200,12 +192,13 @@ impl Block {
 
 /// New numbers of a plane's texels, and how many: 0 for all that only blocked pairs cross, 1 and up for those that
 /// both kinds cross, [`NONE`] for the others.
-fn contested(pairs: &Pairs, plane: &PoolPlane) -> (Vec<u32>, u32) {
-    let mask = plane.open();
+fn contested(pairs: &PairTable, plane: &PoolPlane) -> (Vec<u32>, u32) {
     let texels = plane.width * plane.height;
-    let mut kinds = vec![0u8; mask.blocked.len()];
-    for light in &pairs.lights {
-        mask.for_each_texel(light, |i, texel| kinds[texel] |= if light.vote[i] > 0.0 { 1 } else { 2 });
+    let mut crossed = Vec::new();
+    pairs.crossings(&plane.placed, (plane.width, plane.height), &mut crossed);
+    let mut kinds = vec![0u8; texels + SPARE];
+    for (texel, vote) in crossed.into_iter().zip(&pairs.vote) {
+        kinds[usize::from(texel)] |= if *vote > 0.0 { 1 } else { 2 };
     }
     let mut count = 1;
     let number = |(texel, kinds): (usize, u8)| match kinds {
@@ -220,23 +213,30 @@ fn contested(pairs: &Pairs, plane: &PoolPlane) -> (Vec<u32>, u32) {
     (numbers, count)
 }
 
-fn block(lights: &[LightPairs], pool: &[PoolPlane], numbered: &[(Vec<u32>, u32)], first: &[usize]) -> Block {
-    let votes: Vec<f32> = lights.iter().flat_map(|light| light.vote.iter().copied()).collect();
+fn block(
+    (pairs, lights): (&PairTable, &[LightRows]),
+    pool: &[PoolPlane],
+    numbered: &[(Vec<u32>, u32)],
+    first: &[usize],
+) -> Block {
+    let start = lights[0].start;
+    let votes = &pairs.vote[start..lights[lights.len() - 1].end];
     let mut planes = Vec::with_capacity(pool.len());
     let mut crossed = vec![false; votes.len()];
+    let mut texels = vec![0u16; votes.len()];
     for ((plane, (numbers, _)), first) in pool.iter().zip(numbered).zip(first) {
-        let (mask, mut crossings, mut start) = (plane.open(), Crossings::default(), 0);
-        for light in lights {
-            mask.for_each_texel(light, |i, texel| {
-                let number = numbers[texel];
-                if number != NONE {
-                    let crossing = ((start + i) as u32, number + *first as u32);
-                    let kind = if light.vote[i] > 0.0 { &mut crossings.blocked } else { &mut crossings.lit };
-                    kind.push(crossing);
-                    crossed[start + i] = true;
-                }
-            });
-            start += light.len();
+        for rows in lights {
+            let texels = &mut texels[rows.start - start..rows.end - start];
+            pairs.crossings_of_light(rows, &plane.placed, (plane.width, plane.height), texels);
+        }
+        let mut crossings = Crossings::default();
+        for (i, (&texel, &vote)) in texels.iter().zip(votes).enumerate() {
+            let number = numbers[usize::from(texel)];
+            if number != NONE {
+                let kind = if vote > 0.0 { &mut crossings.blocked } else { &mut crossings.lit };
+                kind.push((i as u32, number + *first as u32));
+                crossed[i] = true;
+            }
         }
         planes.push(crossings);
     }

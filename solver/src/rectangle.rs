@@ -1,10 +1,6 @@
 //! From unbounded planes to rectangles: first around the model's cross-section, then tight around what blocks.
 
-use crate::{
-    plane::ShadowPlane,
-    visibility::Pairs,
-    votes::{Mask, sum_votes},
-};
+use crate::plane::ShadowPlane;
 use glam::{Quat, Vec2, Vec3};
 
 /// Rotations tried between 0 and 90 degrees when a rectangle is fitted: 2.5 degrees apart, where the area of a
@@ -54,40 +50,11 @@ pub fn around_section(low: Vec3, high: Vec3, normal: Vec3, offset: f32) -> Optio
     })
 }
 
-/// May the rectangle turn within its plane?
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Turn {
-    /// Any rotation, whichever needs the least area.
-    Free,
-    /// Edges keep their directions.
-    Fixed,
-}
-
-/// The rectangle in the same plane, tight around the crossings that vote for the blocking texels of `mask`, and
-/// never larger than the mask's own. `None` where nothing blocks.
-#[must_use]
-pub fn tighten(pairs: &Pairs, mask: &Mask, turn: Turn) -> Option<ShadowPlane> {
-    let mut votes = sum_votes(pairs, mask, |_, _, texel| mask.blocked[texel] != 0);
-    votes.truncate(mask.width * mask.height);
-    let blocks = |i: usize| (mask.blocked[i] != 0).then(|| f64::from(votes[i].max(0.0)));
-    around_texels(&mask.plane, (mask.width, mask.height), turn, &blocks)
-}
-
 /// The rectangle in the plane of `plane`, turned for the least area, tight around the texels (`width` a row) with
 /// positive votes. `None` where there is none.
 #[must_use]
 pub fn tight_around(plane: &ShadowPlane, votes: &[f32], width: usize) -> Option<ShadowPlane> {
-    let blocks = |i: usize| (votes[i] > 0.0).then(|| f64::from(votes[i]));
-    around_texels(plane, (width, votes.len() / width), Turn::Free, &blocks)
-}
-
-/// See [`tighten`]; `blocks` gives the votes of a texel that blocks.
-fn around_texels(
-    plane: &ShadowPlane,
-    (width, height): (usize, usize),
-    turn: Turn,
-    blocks: &dyn Fn(usize) -> Option<f64>,
-) -> Option<ShadowPlane> {
+    let height = votes.len() / width;
     let (lu, lv) = (plane.u.length(), plane.v.length());
     let (eu, ev) = (plane.u / lu, plane.v / lv);
     // Texel centres with what they are worth, in the rectangle's own metric.
@@ -96,13 +63,12 @@ fn around_texels(
         Vec2::new(x / width as f32 * lu, y / height as f32 * lv)
     };
     let texels: Vec<(Vec2, f64)> =
-        (0..width * height).filter_map(|i| blocks(i).map(|votes| (centre(i), votes))).collect();
+        votes.iter().enumerate().filter(|(_, v)| **v > 0.0).map(|(i, v)| (centre(i), f64::from(*v))).collect();
     if texels.is_empty() {
         return None;
     }
-    let rotations = if turn == Turn::Free { ROTATIONS } else { 1 };
     let texel = Vec2::new(lu / width as f32, lv / height as f32);
-    let (axis, least, most) = (0..rotations)
+    let (axis, least, most) = (0..ROTATIONS)
         .map(|k| {
             let axis = Vec2::from_angle(k as f32 / ROTATIONS as f32 * std::f32::consts::FRAC_PI_2);
             let half = 0.5 * Vec2::new((axis * texel).abs().element_sum(), (axis.perp() * texel).abs().element_sum());

@@ -11,6 +11,10 @@
 //! (its window), its texture is decided by the pairs of its window, and gains are counted under lights that did not
 //! decide the texture.
 //!
+//! Tried and left out, in an earlier search for one list (teapot, 11 planes, held-out error 0.191 and 0.178 with seeds 1
+//! and 2): four planes too many, then the least useful taken out (0.191, 0.195, at twice the time); three random planes
+//! taken out together and searched anew, kept where better, three times (0.199, 0.167, at three times the time).
+//!
 //! Guaranteed: the result depends on the input alone, not on threads. Not guaranteed: optimality.
 
 use crate::{
@@ -20,7 +24,7 @@ use crate::{
     rectangle::{around_section, enlarged, shifted, tight_around},
     sampling::{hash, uniform},
     shade::CastingPlane,
-    votes::smoothed,
+    smoothing::smoothed,
 };
 use glam::Vec3;
 use rayon::prelude::*;
@@ -81,7 +85,9 @@ pub struct Selection {
     pub replaced: usize,
 }
 
-/// The bias that a search starts with; see [`BIASES`].
+/// The bias that a search starts with; see [`BIASES`]. Held-out error of 11 planes that all had 0.0005, 0.003, 0.008,
+/// 0.015, 0.025 or 0.04, read everywhere: teapot_three 0.183, 0.156, 0.135, 0.138, 0.144, 0.149; aircraft 0.153, 0.139,
+/// 0.126, 0.120, 0.121, 0.135.
 pub const BIAS: f32 = 0.01;
 
 /// What a plane's bias is chosen from: small ones for plates that touch what they shadow, large ones for cuts through

@@ -9,12 +9,12 @@ use shadowfit_solver::{
     certificate::{CertificateOptions, certify},
     lights::LightDomain,
     mesh::Mesh,
-    plane::{ShadowPlane, Side},
+    pair_table::PairTable,
+    plane::{PlacedPlane, ShadowPlane, Side},
     pool::{Instance, PoolPlane},
     relaxation::{Multipliers, bound},
     sampling::uniform,
     visibility::{LightPairs, Pairs},
-    votes::Mask,
 };
 use std::collections::BTreeMap;
 
@@ -43,11 +43,12 @@ fn random_square(seed: u64, index: u64) -> ShadowPlane {
 }
 
 fn pool_plane(plane: ShadowPlane, family: usize) -> PoolPlane {
-    PoolPlane { plane, side: Side::Both, bias: 1e-3, width: TEXELS, height: TEXELS, family }
+    let placed = PlacedPlane { plane, side: Side::Both, bias: 1e-3 };
+    PoolPlane { placed, width: TEXELS, height: TEXELS, family }
 }
 
 /// Receivers in a ball under four discs, with noise, and a pool of discs' planes, their neighbours and others.
-fn tiny(seed: u64, planes: usize) -> (Pairs, Vec<PoolPlane>) {
+fn tiny(seed: u64, planes: usize) -> (PairTable, Vec<PoolPlane>) {
     let discs: Vec<ShadowPlane> = (0..4).map(|k| random_square(100 + seed, k)).collect();
     let hit = |p: Vec3, light: Vec3| {
         discs.iter().any(|disc| {
@@ -87,7 +88,7 @@ fn tiny(seed: u64, planes: usize) -> (Pairs, Vec<PoolPlane>) {
         };
         pool_plane(plane, k as usize)
     });
-    (pairs, pool.collect())
+    (PairTable::new(&pairs, &[Vec3::X]), pool.collect())
 }
 
 fn empty(light: Vec3) -> LightPairs {
@@ -96,24 +97,17 @@ fn empty(light: Vec3) -> LightPairs {
 }
 
 /// `[plane][pair]`: the texel that a pair crosses, if any.
-fn crossings(pairs: &Pairs, pool: &[PoolPlane]) -> Vec<Vec<Option<usize>>> {
+fn crossings(pairs: &PairTable, pool: &[PoolPlane]) -> Vec<Vec<Option<usize>>> {
     let crossed = |plane: &PoolPlane| {
-        let mask = Mask::open(plane.plane, plane.side, plane.bias, plane.width, plane.height);
         let mut texels = Vec::new();
-        for light in &pairs.lights {
-            let first = texels.len();
-            texels.resize(first + light.len(), None);
-            mask.for_each_texel(light, |i, texel| {
-                texels[first + i] = (texel < TEXELS * TEXELS).then_some(texel);
-            });
-        }
-        texels
+        pairs.crossings(&plane.placed, (plane.width, plane.height), &mut texels);
+        texels.into_iter().map(|texel| Some(usize::from(texel)).filter(|texel| *texel < TEXELS * TEXELS)).collect()
     };
     pool.iter().map(crossed).collect()
 }
 
-fn votes(pairs: &Pairs) -> Vec<f64> {
-    pairs.lights.iter().flat_map(|light| &light.vote).map(|vote| f64::from(*vote)).collect()
+fn votes(pairs: &PairTable) -> Vec<f64> {
+    pairs.vote.iter().map(|vote| f64::from(*vote)).collect()
 }
 
 /// The least error of the chosen planes over all binary textures, or `None` where it is not below `limit`.
@@ -175,9 +169,10 @@ fn choices(n: usize, count: usize) -> Vec<Vec<usize>> {
 }
 
 /// The proven least `shadow_error` of any `count` planes of the pool, at most one of a family; `known` is reached.
-fn optimum(pairs: &Pairs, pool: &[PoolPlane], count: usize, known: f64) -> f64 {
+fn optimum(pairs: &PairTable, pool: &[PoolPlane], count: usize, known: f64) -> f64 {
     let (votes, crossings) = (votes(pairs), crossings(pairs, pool));
-    let mut best = known * pairs.shadow_weight + 1e-6;
+    let (shadow, _) = pairs.weights();
+    let mut best = known * shadow + 1e-6;
     for chosen in choices(pool.len(), count) {
         let alone = |k: usize| chosen[..k].iter().all(|other| pool[*other].family != pool[chosen[k]].family);
         if (0..count).all(alone) {
@@ -185,7 +180,7 @@ fn optimum(pairs: &Pairs, pool: &[PoolPlane], count: usize, known: f64) -> f64 {
             best = best_textures(&votes, &planes, best).unwrap_or(best);
         }
     }
-    best / pairs.shadow_weight
+    best / shadow
 }
 
 #[test]
@@ -254,7 +249,7 @@ fn no_multipliers_prove_more_than_any_textures_reach() {
 
 /// `shadow_error` of planes with textures between random and best: each texel follows its votes but for a share.
 fn random_error(
-    (pairs, votes): (&Pairs, &[f64]),
+    (pairs, votes): (&PairTable, &[f64]),
     crossings: &[Vec<Option<usize>>],
     chosen: &[usize],
     seed: u64,
@@ -274,14 +269,14 @@ fn random_error(
         }
     }
     let wrong = |(vote, covered): (&f64, &bool)| if (*vote > 0.0) == *covered { 0.0 } else { vote.abs() };
-    votes.iter().zip(&covered).map(wrong).sum::<f64>() / pairs.shadow_weight
+    votes.iter().zip(&covered).map(wrong).sum::<f64>() / pairs.weights().0
 }
 
 #[test]
 fn planted_planes_are_proven_nearly_best() {
     let mesh = Mesh::new(&planted()).unwrap();
     let sampling = Sampling { domain: LightDomain::Hemisphere, receivers: 3_000, lights: 48, seed: 3 };
-    let pairs = pairs(&mesh, &sampling);
+    let pairs = PairTable::new(&pairs(&mesh, &sampling), &[Vec3::X]);
     let grid = |plane: ShadowPlane, family: usize| PoolPlane { width: 32, height: 32, ..pool_plane(plane, family) };
     let mut pool: Vec<PoolPlane> = Vec::new();
     for (family, plate) in planted_plates().into_iter().enumerate() {
@@ -318,8 +313,7 @@ fn the_certificate_does_not_depend_on_the_number_of_threads() {
 #[test]
 fn without_shadow_there_is_nothing_to_prove() {
     let (mut pairs, pool) = tiny(1, 8);
-    pairs.lights.iter_mut().flat_map(|light| &mut light.vote).for_each(|vote| *vote = -vote.abs());
-    pairs.shadow_weight = 0.0;
+    pairs.vote.iter_mut().for_each(|vote| *vote = -vote.abs());
     let certificate = certify(&pairs, &pool, &[0, 1], &CertificateOptions::default());
     assert_eq!((certificate.lower_bound, certificate.found, certificate.gap), (0.0, 0.0, 0.0));
 }
