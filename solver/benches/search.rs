@@ -1,22 +1,20 @@
 //! What a fit spends its time in: shadow rays, pair evaluations, and the whole search and bake.
 //!
 //! Run: `cargo bench -p shadowfit-solver`. Rates are per second of wall clock on all cores of the rayon pool, except
-//! `score`, which is one plane on one core (a search scores many planes side by side).
+//! `crossings`, which is one plane on one core (a search looks at many planes side by side).
 
 #[path = "../tests/scenes/mod.rs"]
 mod scenes;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use scenes::{Sampling, fit, fit_options, knot, pairs, planted, receivers, soup};
+use scenes::{Sampling, baked, fit_options, knot, list_directions, pairs, planted, receivers, soup};
 use shadowfit_solver::{
-    bake::bake,
-    candidates::generate,
     lights::LightDomain,
     mesh::{Mesh, Sides},
-    plane::ShadowPlane,
-    selection::{Verdict, select},
+    pair_table::PairTable,
+    plane::{PlacedPlane, ShadowPlane, Side},
+    search::{BIAS, Verdict, search},
     visibility::trace,
-    votes::{BIAS, score},
 };
 use std::hint::black_box;
 
@@ -41,16 +39,18 @@ fn rays(c: &mut Criterion) {
 }
 
 fn pair_evaluations(c: &mut Criterion) {
-    let mut group = c.benchmark_group("score");
+    let mut group = c.benchmark_group("crossings");
     let (name, mesh) = &scenes()[0];
-    let pairs = pairs(mesh, &SAMPLING);
-    group.throughput(Throughput::Elements(pairs.len() as u64));
+    let table = PairTable::new(&pairs(mesh, &SAMPLING), &[]);
+    group.throughput(Throughput::Elements(table.len() as u64));
     let normal = scenes::unit_vector(3, 1);
     let (u, v) = normal.any_orthonormal_pair();
     let plane = ShadowPlane { origin: -(u + v), u: u * 2.0, v: v * 2.0 };
+    let placed = PlacedPlane { plane, side: Side::Both, bias: BIAS };
     for texels in [32, 64, 128] {
+        let mut out = Vec::new();
         group.bench_function(format!("{name}, {texels} texels"), |b| {
-            b.iter(|| score(&pairs, black_box(&plane), BIAS, texels))
+            b.iter(|| table.crossings(black_box(&placed), (texels, texels), &mut out));
         });
     }
 }
@@ -58,17 +58,14 @@ fn pair_evaluations(c: &mut Criterion) {
 fn whole_fits(c: &mut Criterion) {
     let mut group = c.benchmark_group("fit");
     group.sample_size(10);
-    let options = fit_options(4, 1);
+    let options = fit_options(SAMPLING.domain, 4, 1);
     for (name, mesh) in scenes() {
-        let pairs = pairs(&mesh, &SAMPLING);
-        let candidates = generate(&mesh, &options.candidates);
-        group.bench_function(format!("select 4, {name}"), |b| {
-            b.iter(|| select(&mesh, &pairs, black_box(&candidates), &options.selection, &mut |_| Verdict::Continue));
-        });
-        let (selection, _) = fit(&mesh, &pairs, &options);
-        group.bench_function(format!("bake 4, {name}"), |b| {
-            b.iter(|| bake(&pairs, black_box(&selection.planes), &options.bake));
-        });
+        let table = PairTable::new(&pairs(&mesh, &SAMPLING), &list_directions(&options));
+        let min_gain = options.min_gain * table.weights().0;
+        let found = || search(&mesh, &table, &options.search, min_gain, &mut |_| Verdict::Continue);
+        group.bench_function(format!("search 4, {name}"), |b| b.iter(found));
+        let planes = found().planes;
+        group.bench_function(format!("bake 4, {name}"), |b| b.iter(|| baked(&table, black_box(&planes), &options)));
     }
 }
 

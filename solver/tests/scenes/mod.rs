@@ -3,16 +3,17 @@
 
 use glam::{DVec3, Vec2, Vec3};
 use shadowfit_solver::{
-    bake::{BakeOptions, bake},
-    candidates::{CandidateOptions, generate},
+    budget::BudgetOptions,
+    fit::bake,
     lights::LightDomain,
+    lists::{ListOptions, assign},
     mesh::{Mesh, Sides, Soup},
     metrics::{Metrics, measure},
-    plane::{BakedPlane, BakedSet},
+    pair_table::{PairTable, SampleSize},
+    plane::BakedSet,
     receivers::{ReceiverOptions, Receivers, sample},
-    rectangle::Turn,
     sampling::uniform,
-    selection::{Selection, SelectionOptions, Verdict, select},
+    search::{Found, SearchOptions, Selection, Verdict, search},
     visibility::{Pairs, trace},
 };
 use std::f64::consts::TAU;
@@ -23,28 +24,43 @@ pub type Triangles = Vec<[DVec3; 3]>;
 /// How hard the tests search and bake.
 #[derive(Clone, Copy, Debug)]
 pub struct FitOptions {
-    pub candidates: CandidateOptions,
-    pub selection: SelectionOptions,
-    pub bake: BakeOptions,
+    /// What the directions of the lists are drawn from, and how many.
+    pub domain: LightDomain,
+    pub directions: usize,
+    pub search: SearchOptions,
+    /// Share of all shadow that a plane must explain.
+    pub min_gain: f64,
+    pub lists: ListOptions,
+    pub budget: BudgetOptions,
 }
 
 /// The one place where tests and benches choose the options of a search.
-pub fn fit_options(max_planes: usize, seed: u64) -> FitOptions {
+pub fn fit_options(domain: LightDomain, max_planes: usize, seed: u64) -> FitOptions {
     FitOptions {
-        candidates: CandidateOptions { directions: 64, offsets: 12, surface_points: 128, seed },
-        selection: SelectionOptions {
+        domain,
+        directions: 32,
+        search: SearchOptions {
             max_planes,
-            min_gain: 0.005,
-            scoring_pairs: [60_000, 100_000],
-            texels: 64,
-            screening_pairs: 4_000,
-            finalists: 8,
+            proposals: 300,
+            screening: SampleSize { lights: 64, pairs: 8_000 },
+            screening_texels: 32,
+            finalists: 10,
             refined: 2,
-            polished: 1,
-            refine_steps: 6,
+            scoring: SampleSize { lights: 192, pairs: 60_000 },
+            texels: 64,
+            refine_steps: 5,
             replace_rounds: 1,
+            seed,
         },
-        bake: BakeOptions { texture_size: 128, rounds: 3, smoothing: 1, turn: Turn::Free },
+        min_gain: 0.005,
+        lists: ListOptions { max_lookups: usize::MAX, grid: 255, rounds: 3, smoothing: 2 },
+        budget: BudgetOptions {
+            max_planes: usize::MAX,
+            bytes: 1 << 20,
+            texture_size: 128,
+            byte_gain: 2e-8,
+            smoothing: 2,
+        },
     }
 }
 
@@ -68,17 +84,29 @@ pub fn pairs(mesh: &Mesh, sampling: &Sampling) -> Pairs {
     trace(mesh, &receivers(mesh, count, seed), &domain.directions(lights, seed), domain.solid_angle())
 }
 
-/// Searches planes for `pairs` and bakes them with the same pairs.
-pub fn fit(mesh: &Mesh, pairs: &Pairs, options: &FitOptions) -> (Selection, Vec<BakedPlane>) {
-    let candidates = generate(mesh, &options.candidates);
-    let selection = select(mesh, pairs, &candidates, &options.selection, &mut |_| Verdict::Continue);
-    let baked = bake(pairs, &selection.planes, &options.bake);
-    (selection, baked)
+/// Searches planes for `pairs` and bakes them with the same pairs, the whole model one section.
+pub fn fit(mesh: &Mesh, pairs: &Pairs, options: &FitOptions) -> (Selection, BakedSet) {
+    let table = PairTable::new(pairs, &list_directions(options));
+    let min_gain = options.min_gain * pairs.shadow_weight;
+    let selection = search(mesh, &table, &options.search, min_gain, &mut |_| Verdict::Continue);
+    let set = baked(&table, &selection.planes, options);
+    (selection, set)
 }
 
-/// The error of planes that every receiver reads.
-pub fn measured(planes: &[BakedPlane], pairs: &Pairs) -> Metrics {
-    measure(&BakedSet::one_section(planes.to_vec()), pairs, &vec![0; pairs.receivers])
+/// The directions of the lists.
+pub fn list_directions(options: &FitOptions) -> Vec<Vec3> {
+    options.domain.directions(options.directions, options.search.seed)
+}
+
+/// Lists and textures of given planes, the whole model one section.
+pub fn baked(table: &PairTable, planes: &[Found], options: &FitOptions) -> BakedSet {
+    let fits = [assign(table, planes, &options.lists)];
+    bake(&fits, &list_directions(options), table.weights().0, &options.budget)
+}
+
+/// The error of a set whose first section every receiver belongs to.
+pub fn measured(set: &BakedSet, pairs: &Pairs) -> Metrics {
+    measure(set, pairs, &vec![0; pairs.receivers])
 }
 
 /// A soup without cut-outs.
