@@ -63,8 +63,8 @@ fn models(folder: &Path) -> Vec<PathBuf> {
 /// Enough to pass every stage, for models of up to 100,000 triangles.
 fn effort() -> Effort {
     let mut least = fits::least();
-    (least.receivers, least.lights) = (4096, 64);
-    least.selection.max_planes = 3;
+    (least.whole.trace.pairs, least.whole.search.max_planes) = (200_000, 3);
+    (least.divided.trace.pairs, least.divided.search.max_planes, least.divided.sections) = (400_000, 2, 8);
     least
 }
 

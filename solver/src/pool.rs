@@ -11,6 +11,7 @@
 use crate::{
     pair_table::{LightRows, PairTable, SPARE},
     plane::PlacedPlane,
+    shade::CastingPlane,
 };
 use rayon::prelude::*;
 
@@ -225,9 +226,10 @@ fn block(
     let mut crossed = vec![false; votes.len()];
     let mut texels = vec![0u16; votes.len()];
     for ((plane, (numbers, _)), first) in pool.iter().zip(numbered).zip(first) {
+        let casting = CastingPlane::new(&plane.placed.plane, plane.placed.side);
         for rows in lights {
             let texels = &mut texels[rows.start - start..rows.end - start];
-            pairs.crossings_of_light(rows, &plane.placed, (plane.width, plane.height), texels);
+            pairs.crossings_of_light(rows, (&casting, plane.placed.bias), (plane.width, plane.height), texels);
         }
         let mut crossings = Crossings::default();
         for (i, (&texel, &vote)) in texels.iter().zip(votes).enumerate() {

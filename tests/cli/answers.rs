@@ -20,7 +20,7 @@ enum Kind {
 use Kind::{Null, Seconds, Share, Text, Texts, UnitVector, Whole};
 
 /// Members of the report of a `fit --validate none`, but for those of `image` and of list entries.
-const MEMBERS: [(&str, Kind); 45] = [
+const MEMBERS: [(&str, Kind); 46] = [
     ("/schema", Text),
     ("/version", Text),
     ("/model", Text),
@@ -66,6 +66,7 @@ const MEMBERS: [(&str, Kind); 45] = [
     ("/command", Text),
     ("/files", Texts),
     ("/curve/1/seconds", Seconds),
+    ("/curve/1/texture_bytes", Whole),
 ];
 
 fn is(value: &Value, kind: Kind) -> bool {
@@ -98,7 +99,19 @@ fn help_and_version_are_answers() {
     for (words, expected) in [
         (&["--help"][..], &["Usage:", "fit", "render"][..]),
         (&["-h"], &["Usage:"]),
-        (&["fit", "--help"], &["--max-planes", "--max-error", "--planes", "--validate", "--json"]),
+        (
+            &["fit", "--help"],
+            &[
+                "--max-planes",
+                "--max-lookups",
+                "--sections",
+                "--texture-budget",
+                "--max-error",
+                "--planes",
+                "--validate",
+                "--json",
+            ],
+        ),
         (&["render", "--help"], &["--light", "--view", "--size", "--mode"]),
         (&["--version"], &[env!("CARGO_PKG_VERSION")]),
     ] {
@@ -139,20 +152,29 @@ fn json_is_one_object_that_keeps_the_contract() {
 #[test]
 fn the_curve_ends_with_the_result() {
     let folder = tempfile::tempdir().unwrap();
-    let printed = fit(&model("t_shape"), folder.path(), &["--json", "--texture-size", "32"]).ok().json();
-    let curve = printed["curve"].as_array().unwrap();
-    let planes = number(&printed, "/planes");
-    let counts: Vec<f64> = curve.iter().map(|point| number(point, "/planes")).collect();
-    assert_eq!(counts, (0..=planes as usize).map(|k| k as f64).collect::<Vec<_>>());
-    assert!(planes >= 1.0);
-    assert_eq!(number(&curve[0], "/shadow_error"), 1.0, "no planes are as good as no shadow");
-    let last = curve.last().unwrap();
-    for member in ["shadow_error", "missed", "false"] {
-        assert_eq!(last[member], printed["held_out"][member]);
-    }
-    for pair in curve.windows(2) {
-        assert!(number(&pair[0], "/seconds") <= number(&pair[1], "/seconds"), "{curve:?}");
-        assert_adds_up(&pair[1]);
+    for more in [&["--max-planes", "4"][..], &["--sections", "4", "--max-lookups", "2"]] {
+        let whole = more[0] == "--max-planes";
+        let words = [&["--json", "--texture-size", "32"], more].concat();
+        let printed = fit(&model("t_shape"), folder.path(), &words).ok().json();
+        let curve = printed["curve"].as_array().unwrap();
+        let planes = number(&printed, "/planes");
+        assert!(planes >= 1.0);
+        let counts: Vec<f64> = curve.iter().map(|point| number(point, "/planes")).collect();
+        if whole {
+            assert_eq!(counts, (0..=planes as usize).map(|k| k as f64).collect::<Vec<_>>());
+        }
+        assert_eq!(number(&curve[0], "/shadow_error"), 1.0, "no planes are as good as no shadow");
+        let last = curve.last().unwrap();
+        for member in ["shadow_error", "missed", "false"] {
+            assert_eq!(last[member], printed["held_out"][member]);
+        }
+        assert_eq!(counts.last(), Some(&planes));
+        for pair in curve.windows(2) {
+            // A whole model has more planes from point to point, a divided one more bytes.
+            let rises = if whole { "/seconds" } else { "/texture_bytes" };
+            assert!(number(&pair[0], rises) <= number(&pair[1], rises), "{curve:?}");
+            assert_adds_up(&pair[1]);
+        }
     }
 }
 

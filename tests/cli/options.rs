@@ -53,17 +53,70 @@ fn a_target_within_reach_is_met_with_few_planes() {
 }
 
 #[test]
-fn textures_are_as_large_as_asked_for() {
-    let mut bytes = Vec::new();
-    for size in [16, 96] {
-        let (folder, report) = fitted("plate_over_ground", &["--texture-size", &size.to_string()]);
-        let texture = &planes(folder.path(), "plate_over_ground").planes[0].texture;
-        let side = texture.width.max(texture.height);
-        // A plane is cropped to what it uses, which is most of it, and gets an open ring of one texel.
-        assert!((size / 2..=size + 2).contains(&side), "{side} texels for --texture-size {size}");
-        bytes.push(number(&report, "/texture_bytes"));
+fn textures_are_no_larger_than_allowed() {
+    let mut largest = Vec::new();
+    for size in [8, 12, 96] {
+        let (folder, _) = fitted("t_shape", &["--max-planes", "2", "--texture-size", &size.to_string()]);
+        let set = planes(folder.path(), "t_shape");
+        let side = set.planes.iter().map(|plane| plane.texture.width.max(plane.texture.height)).max().unwrap();
+        assert!(side <= size, "{side} texels for --texture-size {size}");
+        largest.push(side);
     }
-    assert!(bytes[1] > 4.0 * bytes[0], "{bytes:?}");
+    // Where texels pay for their bytes they are used: an outline of straight lines needs few.
+    assert!(largest[0] == 8 && largest[2] > 12, "{largest:?}");
+}
+
+/// The curve's bytes are those of the textures themselves; the atlases have room between them and power-of-two sides.
+fn curve(report: &Value) -> Vec<(f64, f64, f64)> {
+    let point = |p: &Value| (number(p, "/planes"), number(p, "/texture_bytes"), number(p, "/shadow_error"));
+    report["curve"].as_array().unwrap().iter().map(point).collect()
+}
+
+#[test]
+fn a_divided_model_has_sections_with_short_lists() {
+    let (folder, report) = fitted("t_shape", &["--sections", "6", "--max-lookups", "2"]);
+    assert_eq!(number(&report, "/sections"), 6.0);
+    let set = planes(folder.path(), "t_shape");
+    assert_eq!(set.sections.len(), 6);
+    let (mean, max) = (number(&report, "/lookups/mean"), number(&report, "/lookups/max"));
+    assert!(mean > 0.0 && mean <= max && max <= 2.0, "{mean} {max}");
+    let active = set.active.as_ref().unwrap();
+    assert!(active.lists.iter().flatten().all(|list| list.len() <= 2));
+    let curve = curve(&report);
+    assert!(curve.windows(2).all(|p| p[0].1 <= p[1].1), "{curve:?}");
+    assert_eq!(curve[0], (0.0, 0.0, 1.0));
+    assert_eq!(curve.last().unwrap().2, number(&report, "/held_out/shadow_error"));
+    // One section of two lookups has two planes at most under each light; more sections have more.
+    assert!(curve.last().unwrap().2 < 0.5, "{curve:?}");
+}
+
+#[test]
+fn textures_fit_in_their_budget() {
+    for (budget, bytes) in [("900", 900.0), ("4K", 4096.0), ("4k", 4096.0)] {
+        let (folder, report) = fitted("t_shape", &["--sections", "4", "--texture-budget", budget]);
+        let last = *curve(&report).last().unwrap();
+        assert!(last.0 >= 1.0 && last.1 <= bytes, "{budget}: {last:?}");
+        let set = planes(folder.path(), "t_shape");
+        let texels: usize = set.planes.iter().map(|plane| plane.texture.texels.len()).sum();
+        assert_eq!(texels as f64, last.1, "{budget}");
+    }
+}
+
+#[test]
+fn a_model_is_whole_where_a_few_planes_explain_it_or_their_number_is_given() {
+    for (name, more, sections) in [
+        ("plate_over_ground", &[][..], 1.0),
+        ("box", &[], 1.0),
+        ("t_shape", &["--max-planes", "3"], 1.0),
+        ("t_shape", &["--sections", "1"], 1.0),
+        ("t_shape", &["--sections", "3", "--max-planes", "5"], 3.0),
+    ] {
+        let (_folder, report) = fitted(name, more);
+        assert_eq!(number(&report, "/sections"), sections, "{name} {more:?}");
+        if let ["--sections", _, "--max-planes", most] = more {
+            assert!(number(&report, "/planes") <= most.parse().unwrap(), "{report}");
+        }
+    }
 }
 
 #[test]

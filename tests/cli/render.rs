@@ -96,7 +96,8 @@ fn two_sections(fitted: &Path, ground_reads: &[u32]) -> PathBuf {
     let scene = scene::load(&input).unwrap();
     let frame = Mesh::new(&scene.soup).unwrap().frame;
     let (found, out) = (asset::read(fitted).unwrap(), fitted.with_file_name(format!("{}-planes", ground_reads.len())));
-    let set = BakedSet { sections: vec![vec![], ground_reads.to_vec()], ..found.in_unit_space(&frame) };
+    let sections = vec![vec![], ground_reads.to_vec()];
+    let set = BakedSet { sections, active: None, ..found.in_unit_space(&frame) };
     let low = |corners: &[DVec3; 3]| corners.iter().all(|corner| corner.y < frame.centre_model.y);
     let section_of: Vec<u32> = scene.soup.corners_model.iter().map(|corners| u32::from(low(corners))).collect();
     assert!(section_of.contains(&0) && section_of.contains(&1));

@@ -3,11 +3,13 @@
 pub use shadowfit::pipeline::FitRequest;
 use shadowfit::{
     asset::{ShadowSet, read},
-    effort::Effort,
+    effort::{Effort, Plan},
     pipeline::{FitError, run},
     report::Report,
 };
-use shadowfit_solver::lights::LightDomain;
+use shadowfit_solver::{
+    lights::LightDomain, lists::ListOptions, pair_table::SampleSize, search::SearchOptions, sections::TraceOptions,
+};
 use std::path::{Path, PathBuf};
 
 /// A file of `models/`.
@@ -22,6 +24,9 @@ pub fn request(model: &Path, out_dir: &Path, effort: Effort) -> FitRequest {
         out_dir: out_dir.to_owned(),
         effort,
         max_planes: None,
+        max_lookups: None,
+        sections: None,
+        texture_budget: None,
         max_error: None,
         texture_size: None,
         domain: LightDomain::Sphere,
@@ -36,12 +41,31 @@ pub fn request(model: &Path, out_dir: &Path, effort: Effort) -> FitRequest {
 
 /// The least that still fits planes: for models of some dozen triangles, and where only the outcome counts.
 pub fn least() -> Effort {
-    let mut effort = Effort::fast();
-    let (candidates, selection) = (&mut effort.candidates, &mut effort.selection);
-    (candidates.directions, candidates.offsets, candidates.surface_points) = (60, 8, 100);
-    (selection.texels, selection.finalists, selection.refined) = (48, 12, 2);
-    (effort.receivers, effort.lights, effort.texture_size) = (8192, 96, 64);
-    effort
+    let Effort { whole, divided } = Effort::fast();
+    let search = SearchOptions {
+        proposals: 240,
+        screening: SampleSize { lights: 64, pairs: 8_000 },
+        screening_texels: 32,
+        finalists: 8,
+        refined: 2,
+        scoring: SampleSize { lights: 128, pairs: 30_000 },
+        texels: 48,
+        refine_steps: 4,
+        replace_rounds: 0,
+        ..whole.search
+    };
+    let trace = TraceOptions { pairs: 600_000, lights: 384, stride: 4, exposure_rays: 16, seed: 0 };
+    let lists = ListOptions { grid: 128, ..whole.lists };
+    Effort {
+        whole: Plan { trace, directions: 48, search, lists, ..whole },
+        divided: Plan {
+            sections: 12,
+            trace: TraceOptions { pairs: 1_200_000, ..trace },
+            directions: 48,
+            search: SearchOptions { max_planes: 6, ..search },
+            ..divided
+        },
+    }
 }
 
 /// Runs a fit; what it wrote must read back.
