@@ -13,5 +13,22 @@ mod lights;
 mod placement;
 #[path = "hard_cases/shapes.rs"]
 mod shapes;
+#[path = "hard_cases/stability.rs"]
+mod stability;
 #[path = "hard_cases/surfaces.rs"]
 mod surfaces;
+
+// The cases of the table, see `examples/hard_cases/main.rs`.
+#[allow(dead_code, reason = "shared with the example that writes the table")]
+#[path = "../examples/hard_cases/cases.rs"]
+mod cases;
+#[path = "../examples/hard_cases/double.rs"]
+mod double;
+#[allow(dead_code, reason = "shared with the example that writes the table")]
+#[path = "../examples/hard_cases/fit.rs"]
+mod fit;
+#[path = "../solver/tests/scenes/mod.rs"]
+mod scenes;
+#[allow(dead_code, reason = "shared with the example that writes the table")]
+#[path = "../examples/hard_cases/sweep.rs"]
+mod sweep;
