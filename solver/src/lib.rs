@@ -14,5 +14,6 @@ pub mod rectangle;
 pub mod sampling;
 pub mod selection;
 pub mod shade;
+pub mod shadow_map;
 pub mod visibility;
 pub mod votes;

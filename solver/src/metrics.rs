@@ -41,21 +41,45 @@ pub struct WorstLight {
 }
 
 /// Weighted errors of one light.
-#[derive(Clone, Copy, Default)]
-struct LightError {
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct LightError {
     missed: f64,
     false_: f64,
+}
+
+impl LightError {
+    /// Sums up what `predicted`, the visibility 0..1 of a pair, gets wrong.
+    pub(crate) fn of(light: &LightPairs, predicted: impl Fn(usize) -> f32) -> Self {
+        let mut error = Self::default();
+        for (i, &vote) in light.vote.iter().enumerate() {
+            let (predicted, vote) = (f64::from(predicted(i)), f64::from(vote));
+            if vote > 0.0 {
+                error.missed += vote * predicted;
+            } else {
+                error.false_ -= vote * (1.0 - predicted);
+            }
+        }
+        error
+    }
 }
 
 /// Measures `planes` with the shader's arithmetic, bilinear taps and all.
 #[must_use]
 pub fn measure(planes: &[BakedPlane], pairs: &Pairs) -> Metrics {
+    collect(pairs, |light| {
+        let rows: Vec<_> = planes.iter().map(|b| plane_rows(&b.plane, b.side, light.light)).collect();
+        LightError::of(light, |i| visibility(planes, &rows, light.point(i)))
+    })
+}
+
+/// Measures the errors of each light and sums them up.
+pub(crate) fn collect(pairs: &Pairs, error_of: impl Fn(&LightPairs) -> LightError + Send + Sync) -> Metrics {
     let count = pairs.lights.len();
     let mut metrics = Metrics { receivers: pairs.receivers, lights: count, ..Metrics::default() };
     if pairs.shadow_weight <= 0.0 {
         return metrics;
     }
-    let errors: Vec<LightError> = pairs.lights.par_iter().map(|light| measure_light(planes, light)).collect();
+    let errors: Vec<LightError> = pairs.lights.par_iter().map(error_of).collect();
     let sum = |part: fn(&LightError) -> f64| errors.iter().map(part).sum::<f64>();
     metrics.missed = sum(|e| e.missed) / pairs.shadow_weight;
     metrics.false_ = sum(|e| e.false_) / pairs.shadow_weight;
@@ -68,19 +92,4 @@ pub fn measure(planes: &[BakedPlane], pairs: &Pairs) -> Metrics {
     let (max, direction) = by_light[count - 1];
     metrics.worst_light = WorstLight { max, p95: by_light[(count - 1) * 95 / 100].0, direction: direction.to_array() };
     metrics
-}
-
-fn measure_light(planes: &[BakedPlane], light: &LightPairs) -> LightError {
-    let rows: Vec<_> = planes.iter().map(|b| plane_rows(&b.plane, b.side, light.light)).collect();
-    let mut error = LightError::default();
-    for i in 0..light.len() {
-        let predicted = f64::from(visibility(planes, &rows, light.point(i)));
-        let vote = f64::from(light.vote[i]);
-        if vote > 0.0 {
-            error.missed += vote * predicted;
-        } else {
-            error.false_ -= vote * (1.0 - predicted);
-        }
-    }
-    error
 }
