@@ -4,6 +4,7 @@
 //! no environment, no printing.
 
 pub mod bake;
+pub mod baselines;
 pub mod candidates;
 pub mod lights;
 pub mod mesh;
