@@ -6,7 +6,7 @@
 //! phase's answer for k; its last row is its result, with replaced planes. A baseline's row for k holds the first k
 //! planes that it places, or, where a method places other planes for every k, its answer for k.
 //!
-//! Methods that ask for a tolerance are given each of [`TOLERANCES`], and the one is kept that bakes to the smallest
+//! Methods that ask for a tolerance are given each of `TOLERANCES`, and the one is kept that bakes to the smallest
 //! training error with all planes: so no baseline loses by a setting.
 
 use crate::{

@@ -75,13 +75,14 @@ impl ShadowMap {
         if area.abs() < LEAST_TEXELS {
             return;
         }
+        let inv_area = 1.0 / area;
         let (low, high) = (p.min(q).min(r), p.max(q).max(r));
         for row in centres(low.y, high.y, self.size) {
             let y = row as f32 + 0.5;
             let (left, right) = span(&corners, y);
             for column in centres(left, right, self.size) {
                 let to = Vec2::new(column as f32 + 0.5, y) - p.truncate();
-                let (wq, wr) = (to.perp_dot(e2) / area, e1.perp_dot(to) / area);
+                let (wq, wr) = (to.perp_dot(e2) * inv_area, e1.perp_dot(to) * inv_area);
                 // Slivers amplify rounding: no point of a triangle lies outside its own heights.
                 let height = (p.z + wq * (q.z - p.z) + wr * (r.z - p.z)).clamp(low.z, high.z);
                 let texel = &mut self.height[row * self.size + column];
