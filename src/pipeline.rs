@@ -34,7 +34,7 @@ use std::{
 const EXPOSURE_RAYS: usize = 64;
 
 /// Held-out receivers and lights: other numbers than any preset trains on, so that the lattices differ too.
-const HELD_OUT: [usize; 2] = [24_000, 307];
+pub(crate) const HELD_OUT: [usize; 2] = [24_000, 307];
 
 /// Receivers and lights of the pairs that a certificate is about.
 const CERTIFIED: [usize; 2] = [24_576, 160];
@@ -329,7 +329,7 @@ fn skipped(scene: &Scene, mesh: &Mesh, not_copied: &[String]) -> Vec<Skipped> {
 }
 
 /// File name of the model without its ending.
-fn stem_of(model: &Path) -> String {
+pub(crate) fn stem_of(model: &Path) -> String {
     model.file_stem().map_or_else(|| "model".to_string(), |stem| stem.to_string_lossy().into_owned())
 }
 

@@ -1,13 +1,13 @@
 //! Bake: the final textures of all sections' planes, and the lists that read them.
 //!
-//! In: per section, planes with votes on fine grids and a list per direction. Out: one set. Each plane gets a distance
-//! field of the size that the budget gives it; planes that are not worth their bytes leave the lists.
+//! In: per section, planes with votes on fine grids and a list per direction. Out: one set. Each plane gets a texture of
+//! the size and encoding that the budget gives it; planes that are not worth their bytes leave the lists.
 
 use crate::{
-    budget::{self, BudgetOptions},
+    budget::{Allocation, BudgetOptions, allocate},
     field::{VoteGrid, VotedShape},
     lists::{SectionFit, VotedPlane},
-    plane::{ActiveLists, BakedPlane, BakedSet, PlacedPlane},
+    plane::{ActiveLists, BakedPlane, BakedSet, Encoding, PlacedPlane},
 };
 use glam::Vec3;
 use rayon::prelude::*;
@@ -17,9 +17,9 @@ use rayon::prelude::*;
 #[must_use]
 pub fn bake(fits: &[SectionFit], directions: &[Vec3], shadow_weight: f64, options: &BudgetOptions) -> BakedSet {
     let planes: Vec<&VotedPlane> = fits.iter().flat_map(|fit| &fit.planes).collect();
-    let sizes = budget::sizes(&planes, shadow_weight, options);
+    let Allocation { encoding, sizes } = allocate(&planes, shadow_weight, options);
     let bake_one = |(plane, size): (&&VotedPlane, &Option<(usize, usize)>)| {
-        size.and_then(|size| baked(plane, size, options.smoothing))
+        size.and_then(|size| baked(plane, (encoding, size), options.smoothing))
     };
     let baked: Vec<Option<BakedPlane>> = planes.par_iter().zip(&sizes).map(bake_one).collect();
     let mut set = BakedSet::default();
@@ -42,11 +42,11 @@ pub fn bake(fits: &[SectionFit], directions: &[Vec3], shadow_weight: f64, option
     set
 }
 
-/// The plane with a field of the given size; `None` where it would block nothing.
-fn baked(plane: &VotedPlane, size: (usize, usize), smoothing: usize) -> Option<BakedPlane> {
+/// The plane with a texture of the given size; `None` where it would block nothing.
+fn baked(plane: &VotedPlane, (encoding, size): (Encoding, (usize, usize)), smoothing: usize) -> Option<BakedPlane> {
     let votes: Vec<f32> = plane.votes[0].iter().zip(&plane.votes[1]).map(|(a, b)| a + b).collect();
     let grid = VoteGrid { votes: &votes, width: plane.width, height: plane.height };
-    let texture = VotedShape::new(grid, smoothing).field(size);
+    let texture = VotedShape::new(grid, smoothing).texture(encoding, size);
     let blocks = texture.texels.iter().any(|&texel| !texture.is_open(texel));
     let PlacedPlane { plane, side, bias } = plane.placed;
     blocks.then_some(BakedPlane { plane, texture, side, bias })

@@ -4,6 +4,7 @@
 //! no environment, no printing.
 
 pub mod bake;
+pub mod baselines;
 pub mod budget;
 pub mod candidates;
 pub mod certificate;
@@ -25,5 +26,6 @@ pub mod search;
 pub mod sections;
 pub mod selection;
 pub mod shade;
+pub mod shadow_map;
 pub mod visibility;
 pub mod votes;
