@@ -1,6 +1,7 @@
 //! The command line: raw arguments, checked into requests, run, and answered with an exit code.
 
 use crate::{
+    ablation,
     asset::{self, AssetError},
     effort::Effort,
     pipeline::{self, FitError, FitRequest},
@@ -10,7 +11,11 @@ use crate::{
 };
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use shadowfit_solver::{columns::ColumnOptions, lights::direction, mesh::Mesh};
+use shadowfit_solver::{
+    columns::ColumnOptions,
+    lights::{LightDomain, direction},
+    mesh::Mesh,
+};
 use std::{io::IsTerminal, path::PathBuf, time::Duration};
 
 /// Finds shadow planes through a 3D model and bakes occluder textures on them: self-shadows for any light in one
@@ -28,6 +33,9 @@ enum Command {
     Fit(FitArgs),
     /// Draw a fitted asset to a PNG.
     Render(RenderArgs),
+    /// Measure error against planes: of the method, of it with each part switched off, of published baselines, and of
+    /// shadow maps.
+    Ablate(AblateArgs),
 }
 
 #[derive(Debug, Args)]
@@ -54,7 +62,7 @@ struct FitArgs {
     #[arg(long, value_name = "E", value_parser = error_share, conflicts_with_all = ["sections", "max_lookups"])]
     max_error: Option<f64>,
     /// Texels along the longer side of each plane [default: 128].
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(8..=255))]
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(8..=256))]
     texture_size: Option<u16>,
     /// Light directions to serve: sphere, hemisphere, or cone:AZIMUTH,ELEVATION,HALF_ANGLE in degrees.
     #[arg(long, value_name = "DOMAIN", default_value = "sphere")]
@@ -81,6 +89,40 @@ struct FitArgs {
     /// Print the report as one JSON object instead of the table.
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Debug, Args)]
+struct AblateArgs {
+    /// The model: .glb or .gltf.
+    model: PathBuf,
+    /// Folder of the tables; made where it is missing.
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
+    /// Most planes of each method.
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=200))]
+    max_planes: u16,
+    /// Measure the rectangles of this JSON file too.
+    #[arg(long, value_name = "FILE")]
+    planes: Option<PathBuf>,
+    /// Sections of the divided model [default: by preset, 48 (fast), 96 or 160 (best), where a few planes do not
+    /// explain all shadow]; 1 measures whole models only.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    sections: Option<u16>,
+    /// Texels along the longer side of each plane at most [default: 128].
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(8..=256))]
+    texture_size: Option<u16>,
+    /// Light directions to serve: sphere, hemisphere, or cone:AZIMUTH,ELEVATION,HALF_ANGLE in degrees.
+    #[arg(long, value_name = "DOMAIN", default_value = "sphere")]
+    lights: String,
+    /// How much work to do.
+    #[arg(long, value_enum, default_value_t = Preset::Balanced)]
+    preset: Preset,
+    /// Seed of all sampling.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+    /// Threads [default: one a core]. Only the seconds depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -196,26 +238,37 @@ pub fn run(cli: Cli, command: String) -> Result<(), CliError> {
     match cli.command {
         Command::Fit(args) => fit(args, command),
         Command::Render(args) => render(&args),
+        Command::Ablate(args) => ablate(args, command),
     }
 }
 
+impl Preset {
+    fn effort(self) -> Effort {
+        match self {
+            Self::Fast => Effort::fast(),
+            Self::Balanced => Effort::balanced(),
+            Self::Best => Effort::best(),
+        }
+    }
+}
+
+fn light_domain(text: &str) -> Result<LightDomain, CliError> {
+    text.parse().map_err(|error| CliError::Usage(format!("--lights: {error}")))
+}
+
+fn set_threads(threads: Option<u16>) -> Result<(), CliError> {
+    let Some(threads) = threads else { return Ok(()) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
+    pool.map_err(|error| CliError::Usage(format!("--threads: {error}")))
+}
+
 fn fit(args: FitArgs, command: String) -> Result<(), CliError> {
-    let domain = args.lights.parse().map_err(|error| CliError::Usage(format!("--lights: {error}")))?;
-    if let Some(count) = args.sections.filter(|count| args.certificate && *count > 1) {
-        return Err(CliError::Usage(format!("--certificate is about a whole model: --sections {count} divides it")));
-    }
-    if let Some(threads) = args.threads {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
-        pool.map_err(|error| CliError::Usage(format!("--threads: {error}")))?;
-    }
+    let domain = light_domain(&args.lights)?;
+    set_threads(args.threads)?;
     let request = FitRequest {
         model: args.model,
         out_dir: args.out,
-        effort: match args.preset {
-            Preset::Fast => Effort::fast(),
-            Preset::Balanced => Effort::balanced(),
-            Preset::Best => Effort::best(),
-        },
+        effort: args.preset.effort(),
         max_planes: args.max_planes.map(usize::from),
         max_lookups: args.max_lookups.map(usize::from),
         sections: args.sections.map(usize::from),
@@ -250,6 +303,35 @@ fn fit(args: FitArgs, command: String) -> Result<(), CliError> {
         }
         _ => Ok(()),
     }
+}
+
+/// Measures all methods and prints the table.
+fn ablate(args: AblateArgs, command: String) -> Result<(), CliError> {
+    let domain = light_domain(&args.lights)?;
+    set_threads(args.threads)?;
+    let request = FitRequest {
+        model: args.model,
+        out_dir: args.out,
+        effort: args.preset.effort(),
+        max_planes: Some(usize::from(args.max_planes)),
+        max_lookups: None,
+        sections: args.sections.map(usize::from),
+        texture_budget: None,
+        certificate: None,
+        max_error: None,
+        texture_size: args.texture_size.map(usize::from),
+        domain,
+        domain_text: args.lights,
+        planes: args.planes,
+        validation: None,
+        seed: args.seed,
+        command,
+    };
+    let bar = progress_bar();
+    let outcome = ablation::run(&request, &mut |message| bar.set_message(message));
+    bar.finish_and_clear();
+    print!("{}", outcome?);
+    Ok(())
 }
 
 /// A spinner on a terminal, nothing elsewhere.

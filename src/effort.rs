@@ -1,7 +1,11 @@
 //! Presets: how much work a fit does.
 
 use shadowfit_solver::{
-    budget::BudgetOptions, lists::ListOptions, pair_table::SampleSize, search::SearchOptions, sections::TraceOptions,
+    budget::{BudgetOptions, Sizing},
+    lists::ListOptions,
+    pair_table::SampleSize,
+    search::SearchOptions,
+    sections::TraceOptions,
 };
 
 /// How much work a fit does.
@@ -99,6 +103,8 @@ impl Effort {
                 max_planes: usize::MAX,
                 bytes: TEXTURE_BUDGET,
                 texture_size: 128,
+                sizing: Sizing::ByGain,
+                encoding: None,
                 byte_gain: 2e-8,
                 smoothing: 1,
             },

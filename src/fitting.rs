@@ -22,7 +22,7 @@ use shadowfit_solver::{
     metrics::{Metrics, measure, measure_tables},
     pair_table::{PairTable, SampleSize},
     plane::{BakedSet, PlacedPlane},
-    receivers::{ReceiverOptions, sample},
+    receivers::{ReceiverOptions, Receivers, sample},
     search::{Found, SearchOptions, Verdict, place, search},
     sections,
     visibility::{Pairs, trace},
@@ -87,10 +87,7 @@ pub(crate) fn fit(
 ) -> Result<Fitted, AssetError> {
     let start = Instant::now();
     progress("looking at the model".to_string());
-    let (receivers, rays, lights) = PILOT;
-    let seed = seed_for(request, Purpose::Pilot);
-    let pilot = sample(mesh, &ReceiverOptions { count: receivers, exposure_rays: rays, seed });
-    let pilot_pairs = trace(mesh, &pilot, &request.domain.directions(lights, seed), request.domain.solid_angle());
+    let (pilot, pilot_pairs) = pilot(request, mesh);
     let plan = plan(request, mesh, &pilot_pairs);
     let section_of = sections::divide(mesh, &units(scene, mesh), (&pilot, &pilot_pairs), plan.sections);
     times.receivers = start.elapsed().as_secs_f64();
@@ -120,8 +117,18 @@ pub(crate) fn fit(
     Ok(Fitted { set, section_of, smaller, training, certificate })
 }
 
+/// The first look at a model: receivers by which it is divided, and their pairs.
+pub(crate) fn pilot(request: &FitRequest, mesh: &Mesh) -> (Receivers, Pairs) {
+    let (count, exposure_rays, lights) = PILOT;
+    let seed = seed_for(request, Purpose::Pilot);
+    let receivers = sample(mesh, &ReceiverOptions { count, exposure_rays, seed });
+    let lights = request.domain.directions(lights, seed);
+    let pairs = trace(mesh, &receivers, &lights, request.domain.solid_angle());
+    (receivers, pairs)
+}
+
 /// The preset's numbers with the user's; one section where a quick search shows that it will do.
-fn plan(request: &FitRequest, mesh: &Mesh, pilot: &Pairs) -> Plan {
+pub(crate) fn plan(request: &FitRequest, mesh: &Mesh, pilot: &Pairs) -> Plan {
     let effort = &request.effort;
     let counted = request.max_planes.is_some() || request.max_error.is_some() || request.planes.is_some();
     let listed = request.max_lookups.is_some() || request.texture_budget.is_some();
@@ -161,7 +168,7 @@ fn is_simple(request: &FitRequest, mesh: &Mesh, pilot: &Pairs) -> bool {
 }
 
 /// For each triangle of the mesh a number that its copies in the scene share.
-fn units(scene: &Scene, mesh: &Mesh) -> Vec<u32> {
+pub(crate) fn units(scene: &Scene, mesh: &Mesh) -> Vec<u32> {
     let mut numbers = HashMap::new();
     let mut number = |source: &u32| {
         let next = numbers.len() as u32;

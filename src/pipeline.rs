@@ -30,7 +30,7 @@ use std::{
 const EXPOSURE_RAYS: usize = 64;
 
 /// Held-out receivers and lights: other numbers than any preset trains on, so that the lattices differ too.
-const HELD_OUT: [usize; 2] = [24_000, 307];
+pub(crate) const HELD_OUT: [usize; 2] = [24_000, 307];
 
 /// What a sampling is for: no two share their points.
 #[derive(Clone, Copy)]
@@ -303,7 +303,7 @@ fn skipped(scene: &Scene, mesh: &Mesh, not_copied: &[String]) -> Vec<Skipped> {
 }
 
 /// File name of the model without its ending.
-fn stem_of(model: &Path) -> String {
+pub(crate) fn stem_of(model: &Path) -> String {
     model.file_stem().map_or_else(|| "model".to_string(), |stem| stem.to_string_lossy().into_owned())
 }
 

@@ -3,6 +3,8 @@
 
 #![allow(clippy::unwrap_used, reason = "clippy sees only #[test] functions as tests, not what they call")]
 
+#[path = "cli/ablate.rs"]
+mod ablate;
 #[path = "cli/answers.rs"]
 mod answers;
 #[allow(dead_code, reason = "shared with tests/scene.rs, which uses more of it")]

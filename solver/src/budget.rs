@@ -1,14 +1,15 @@
-//! Budget: how many texels each plane gets.
+//! Budget: how many texels each plane gets, and what they mean.
 //!
-//! In: planes with votes on fine grids. Out: a size for each, or none where it is not worth its bytes. Method: at a few
-//! sizes a field is fitted to the votes of one fold and counted on those of the other, which is what the plane is worth
-//! at that size; then the sizes with the largest worth less bytes times a price are taken, and the price is raised until
+//! In: planes with votes on fine grids. Out: a size for each, or none where it is not worth its bytes, and the encoding
+//! of all. Method: at a few sizes a texture is fitted to the votes of one fold and counted on those of the other, which
+//! is what the plane is worth at that size; then the sizes with the largest worth less bytes times a price are taken, and the price is raised until
 //! the bytes fit (Lagrangian relaxation of the multiple-choice knapsack problem; Shoham and Gersho, "Efficient Bit
-//! Allocation for an Arbitrary Set of Quantizers", 1988).
+//! Allocation for an Arbitrary Set of Quantizers", 1988). The encoding is the one that is worth more.
 
 use crate::{
     field::{VoteGrid, VotedShape, blocked_votes},
     lists::VotedPlane,
+    plane::Encoding,
 };
 use rayon::prelude::*;
 
@@ -19,16 +20,38 @@ pub struct BudgetOptions {
     pub max_planes: usize,
     /// Most bytes of all textures together.
     pub bytes: usize,
-    /// Most texels along the longer side of a texture, 8 and up.
+    /// Most texels along the longer side of a texture, 8 to 256.
     pub texture_size: usize,
+    /// What decides how many of them a texture has.
+    pub sizing: Sizing,
+    /// What texels mean; `None`: whichever is worth more.
+    pub encoding: Option<Encoding>,
     /// Share of the shadow that a byte must gain; planes that do not pay are dropped.
     pub byte_gain: f64,
     /// Passes over the votes that decide a field's first border.
     pub smoothing: usize,
 }
 
+/// How a texture's size is chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Sizing {
+    /// By what its bytes gain.
+    ByGain,
+    /// As large as may be; neither bytes nor their gains count.
+    Largest,
+}
+
+/// Planes with their sizes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Allocation {
+    /// Of all textures.
+    pub encoding: Encoding,
+    /// Width and height of each plane's texture, the open ring included; `None`: dropped.
+    pub sizes: Vec<Option<(usize, usize)>>,
+}
+
 /// Texels along the longer side that are tried; gains between two of them are interpolated.
-const TRIED: [usize; 5] = [8, 16, 32, 64, 128];
+const TRIED: [usize; 6] = [8, 16, 32, 64, 128, 256];
 
 /// Sizes between two tried ones.
 const STEPS: usize = 4;
@@ -38,27 +61,58 @@ const PRICE_STEPS: usize = 60;
 
 /// One size that a plane may have.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Offer {
+struct Offer {
     /// Width and height, texels.
-    pub size: (usize, usize),
+    size: (usize, usize),
     /// What it costs.
-    pub bytes: usize,
+    bytes: usize,
     /// Drop of the weighted error that it brings, decided and counted under different lights.
-    pub gain: f64,
+    gain: f64,
 }
 
-/// What each plane is worth at each size; `bytes` and `byte_gain` have no part in it.
-#[must_use]
-pub fn offers(planes: &[&VotedPlane], options: &BudgetOptions) -> Vec<Vec<Offer>> {
-    let mut offers: Vec<Vec<Offer>> = planes.par_iter().map(|plane| offers_of(plane, options)).collect();
-    keep_best(&mut offers, options.max_planes);
-    offers
+/// What planes are worth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Offers {
+    /// Per encoding and plane, at each size.
+    by_encoding: Vec<(Encoding, Vec<Vec<Offer>>)>,
 }
 
-/// Width and height of each plane's texture, the open ring included; `None`: dropped. `shadow_weight` is that of all
-/// pairs.
+impl Offers {
+    /// Measures planes; `bytes` and `byte_gain` have no part in it.
+    #[must_use]
+    pub fn new(planes: &[&VotedPlane], options: &BudgetOptions) -> Self {
+        let encodings =
+            options.encoding.map_or_else(|| vec![Encoding::Sdf, Encoding::Coverage], |encoding| vec![encoding]);
+        let of_encoding = |encoding: Encoding| {
+            let mut offers: Vec<Vec<Offer>> =
+                planes.par_iter().map(|plane| offers_of(plane, encoding, options)).collect();
+            keep_best(&mut offers, options.max_planes);
+            (encoding, offers)
+        };
+        Self { by_encoding: encodings.into_iter().map(of_encoding).collect() }
+    }
+}
+
+/// Sizes and encoding of the planes' textures. `shadow_weight` is that of all pairs.
 #[must_use]
-pub fn sizes(offers: &[Vec<Offer>], shadow_weight: f64, options: &BudgetOptions) -> Vec<Option<(usize, usize)>> {
+pub fn allocate(offers: &Offers, shadow_weight: f64, options: &BudgetOptions) -> Allocation {
+    let (least_price, most_bytes) = match options.sizing {
+        Sizing::ByGain => (options.byte_gain * shadow_weight, options.bytes),
+        Sizing::Largest => (0.0, usize::MAX),
+    };
+    let allocation = |(encoding, offers): &(Encoding, Vec<Vec<Offer>>)| {
+        let chosen = chosen(offers, least_price, most_bytes);
+        let worth: f64 = chosen.iter().flatten().map(|offer| offer.gain - least_price * offer.bytes as f64).sum();
+        let sizes = chosen.into_iter().map(|offer| offer.map(|offer| offer.size)).collect();
+        (worth, Allocation { encoding: *encoding, sizes })
+    };
+    let allocations = offers.by_encoding.iter().map(allocation);
+    let best = allocations.reduce(|a, b| if b.0 > a.0 { b } else { a });
+    best.map_or_else(|| Allocation { encoding: Encoding::Sdf, sizes: Vec::new() }, |(_, allocation)| allocation)
+}
+
+/// The best offer to each plane at the least price of a byte at which all fit.
+fn chosen(offers: &[Vec<Offer>], least_price: f64, most_bytes: usize) -> Vec<Option<Offer>> {
     let choose = |price: f64| -> Vec<Option<Offer>> {
         let worth = |offer: &&Offer| offer.gain - price * offer.bytes as f64;
         let best = |offers: &Vec<Offer>| {
@@ -68,20 +122,20 @@ pub fn sizes(offers: &[Vec<Offer>], shadow_weight: f64, options: &BudgetOptions)
         offers.iter().map(best).collect()
     };
     let bytes = |chosen: &[Option<Offer>]| chosen.iter().flatten().map(|offer| offer.bytes).sum::<usize>();
-    let mut low = options.byte_gain * shadow_weight;
+    let mut low = least_price;
     let mut chosen = choose(low);
-    if bytes(&chosen) > options.bytes {
+    if bytes(&chosen) > most_bytes {
         let mut high = low.max(f64::MIN_POSITIVE);
-        while bytes(&choose(high)) > options.bytes {
+        while bytes(&choose(high)) > most_bytes {
             (low, high) = (high, high * 2.0);
         }
         for _ in 0..PRICE_STEPS {
             let middle = 0.5 * (low + high);
-            *(if bytes(&choose(middle)) > options.bytes { &mut low } else { &mut high }) = middle;
+            *(if bytes(&choose(middle)) > most_bytes { &mut low } else { &mut high }) = middle;
         }
         chosen = choose(high);
     }
-    chosen.into_iter().map(|offer| offer.map(|offer| offer.size)).collect()
+    chosen
 }
 
 /// Leaves offers only to the `count` planes with the largest gains.
@@ -95,15 +149,19 @@ fn keep_best(offers: &mut [Vec<Offer>], count: usize) {
 }
 
 /// What a plane is worth at each size.
-fn offers_of(plane: &VotedPlane, options: &BudgetOptions) -> Vec<Offer> {
+fn offers_of(plane: &VotedPlane, encoding: Encoding, options: &BudgetOptions) -> Vec<Offer> {
     let grid = |fold: usize| VoteGrid { votes: &plane.votes[fold], width: plane.width, height: plane.height };
     let shapes = [0, 1].map(|fold| VotedShape::new(grid(fold), options.smoothing));
     let most = options.texture_size.min(TRIED[TRIED.len() - 1]).max(TRIED[0]);
     let measured = |size: usize| {
         let shape = texture_shape(plane, size);
-        let worth = |fold: usize| blocked_votes(&grid(1 - fold), &shapes[fold].field(shape));
+        let worth = |fold: usize| blocked_votes(&grid(1 - fold), &shapes[fold].texture(encoding, shape));
         worth(0) + worth(1)
     };
+    if options.sizing == Sizing::Largest {
+        let size = texture_shape(plane, most);
+        return vec![Offer { size, bytes: size.0 * size.1, gain: measured(most) }];
+    }
     let mut offers = Vec::new();
     let mut last: Option<(usize, f64)> = None;
     for size in TRIED.into_iter().take_while(|size| *size < most).chain([most]) {

@@ -1,10 +1,12 @@
-//! Distance fields: from votes on a fine grid to the few bytes of a texture.
+//! Textures: from votes on a fine grid to the few bytes of a distance field or a coverage.
 //!
 //! In: votes per cell (positive: block). Out: a coarse one-byte field whose bilinear value reaches the border where the
-//! votes want it. Method: the signed distance to the border of what the smoothed votes block (exact transform of
+//! votes want it, or coverage, whose bilinear value is what is blocked. Method of fields: the signed distance to the border of what the smoothed votes block (exact transform of
 //! Felzenszwalb and Huttenlocher, "Distance Transforms of Sampled Functions", 2012), averaged per texel; then every
 //! texel near the border in turn is set to the byte with the largest sum of blocked votes, the others frozen. That
 //! step is exact: a cell's value is linear in the texel, so each cell has one byte at which it begins to block.
+//! Coverage needs no descent: what it blocks is linear in all texels, so each is decided alone, by the sum of the votes
+//! with the weights of bilinear interpolation.
 //!
 //! Not guaranteed: the best field (the descent ends in a local optimum).
 
@@ -38,6 +40,7 @@ pub struct VoteGrid<'a> {
 #[derive(Clone, Debug)]
 pub struct VotedShape<'a> {
     grid: VoteGrid<'a>,
+    smooth: Vec<f32>,
     distance: Vec<f32>,
 }
 
@@ -54,7 +57,42 @@ impl<'a> VotedShape<'a> {
         let [to_blocked, to_open] = [true, false].map(|kind| squared_distance(&blocked, grid.width, kind));
         // The border lies half a cell before the nearest cell of the other kind.
         let signed = |i: usize| if blocked[i] { to_open[i].sqrt() - 0.5 } else { 0.5 - to_blocked[i].sqrt() };
-        Self { grid, distance: (0..blocked.len()).map(signed).collect() }
+        Self { grid, distance: (0..blocked.len()).map(signed).collect(), smooth: votes }
+    }
+
+    /// A texture of `width` x `height` texels, 3 and up, over the rectangle of the votes.
+    #[must_use]
+    pub fn texture(&self, encoding: Encoding, size: (usize, usize)) -> OccluderTexture {
+        match encoding {
+            Encoding::Coverage => self.coverage(size),
+            Encoding::Sdf => self.field(size),
+        }
+    }
+
+    /// The coverage that gains most on the smoothed votes, which also decided a field's first border; the outermost
+    /// ring is open, as of a field.
+    #[must_use]
+    pub fn coverage(&self, (width, height): (usize, usize)) -> OccluderTexture {
+        let scale = Scale::new(&self.grid, (width, height));
+        let mut sums = vec![0.0f32; width * height];
+        for (row, votes) in self.smooth.chunks_exact(self.grid.width).enumerate() {
+            let (y0, y1, fy) = scale.taps(scale.y, row, height);
+            for (column, vote) in votes.iter().enumerate() {
+                let (x0, x1, fx) = scale.taps(scale.x, column, width);
+                for (y, weight) in [(y0, 1.0 - fy), (y1, fy)] {
+                    sums[y * width + x0] += vote * weight * (1.0 - fx);
+                    sums[y * width + x1] += vote * weight * fx;
+                }
+            }
+        }
+        // Texels between cells of a coarser grid.
+        fill_unvoted(&mut sums, width);
+        let texel = |(i, sum): (usize, &f32)| {
+            let is_open = *sum <= 0.0 || on_ring(i % width, i / width, (width, height));
+            if is_open { 0 } else { u8::MAX }
+        };
+        let texels = sums.iter().enumerate().map(texel).collect();
+        OccluderTexture { width, height, encoding: Encoding::Coverage, texels }
     }
 
     /// The best field found of `width` x `height` texels, 3 and up, over the rectangle of the votes. The outermost ring
@@ -138,7 +176,7 @@ impl<'a> VotedShape<'a> {
     }
 }
 
-/// Votes of the cells that a field blocks.
+/// Votes of the cells that a texture blocks, each by the share of it that is blocked.
 #[must_use]
 pub fn blocked_votes(grid: &VoteGrid, texture: &OccluderTexture) -> f64 {
     let scale = Scale::new(grid, (texture.width, texture.height));
@@ -152,7 +190,11 @@ pub fn blocked_votes(grid: &VoteGrid, texture: &OccluderTexture) -> f64 {
                 let (x0, x1, fx) = scale.taps(scale.x, cell_x, texture.width);
                 let row = |y: usize| texel(x0, y) + fx * (texel(x1, y) - texel(x0, y));
                 let value = row(y0) + fy * (row(y1) - row(y0));
-                sum += if value >= BORDER { f64::from(vote) } else { 0.0 };
+                let blocked = match texture.encoding {
+                    Encoding::Coverage => f64::from(value) / 255.0,
+                    Encoding::Sdf => f64::from(u8::from(value >= BORDER)),
+                };
+                sum += blocked * f64::from(vote);
             }
         }
     }
@@ -193,10 +235,13 @@ fn cells_around(texel: usize, scale: f32, cells: usize) -> std::ops::Range<usize
     (low.floor().max(0.0) as usize).min(cells)..(high.ceil().max(0.0) as usize).min(cells)
 }
 
-/// The largest byte that a texel may have: the outermost ring stays open.
-fn most(x: usize, y: usize, (width, height): (usize, usize)) -> f32 {
-    let on_ring = x == 0 || y == 0 || x == width - 1 || y == height - 1;
-    if on_ring { BORDER.floor() } else { 255.0 }
+/// The largest byte that a field's texel may have: the outermost ring stays open.
+fn most(x: usize, y: usize, size: (usize, usize)) -> f32 {
+    if on_ring(x, y, size) { BORDER.floor() } else { 255.0 }
+}
+
+fn on_ring(x: usize, y: usize, (width, height): (usize, usize)) -> bool {
+    x == 0 || y == 0 || x == width - 1 || y == height - 1
 }
 
 /// Is one of the texel's eight neighbours on the other side of the border, or is it within a texel of it?

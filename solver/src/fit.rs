@@ -1,13 +1,13 @@
 //! Bake: the final textures of all sections' planes, and the lists that read them.
 //!
-//! In: per section, planes with votes on fine grids and a list per direction. Out: one set. Each plane gets a distance
-//! field of the size that the budget gives it; planes that are not worth their bytes leave the lists.
+//! In: per section, planes with votes on fine grids and a list per direction. Out: one set. Each plane gets a texture of
+//! the size and encoding that the budget gives it; planes that are not worth their bytes leave the lists.
 
 use crate::{
-    budget::{self, BudgetOptions},
+    budget::{Allocation, BudgetOptions, Offers, allocate},
     field::{VoteGrid, VotedShape},
     lists::{SectionFit, VotedPlane},
-    plane::{ActiveLists, BakedPlane, BakedSet, PlacedPlane},
+    plane::{ActiveLists, BakedPlane, BakedSet, Encoding, PlacedPlane},
 };
 use glam::Vec3;
 use rayon::prelude::*;
@@ -29,10 +29,10 @@ pub fn bake_within(
 ) -> Vec<BakedSet> {
     let Some(first) = options.first() else { return Vec::new() };
     let planes: Vec<&VotedPlane> = fits.iter().flat_map(|fit| &fit.planes).collect();
-    let offers = budget::offers(&planes, first);
+    let offers = Offers::new(&planes, first);
     let bake = |options: &BudgetOptions| {
-        let sizes = budget::sizes(&offers, shadow_weight, options);
-        bake_sizes(fits, &planes, &sizes, (directions, options.smoothing))
+        let allocation = allocate(&offers, shadow_weight, options);
+        bake_sizes(fits, &planes, &allocation, (directions, options.smoothing))
     };
     options.iter().map(bake).collect()
 }
@@ -41,12 +41,13 @@ pub fn bake_within(
 fn bake_sizes(
     fits: &[SectionFit],
     planes: &[&VotedPlane],
-    sizes: &[Option<(usize, usize)>],
+    allocation: &Allocation,
     (directions, smoothing): (&[Vec3], usize),
 ) -> BakedSet {
-    let bake_one =
-        |(plane, size): (&&VotedPlane, &Option<(usize, usize)>)| size.and_then(|size| baked(plane, size, smoothing));
-    let baked: Vec<Option<BakedPlane>> = planes.par_iter().zip(sizes).map(bake_one).collect();
+    let bake_one = |(plane, size): (&&VotedPlane, &Option<(usize, usize)>)| {
+        size.and_then(|size| baked(plane, (allocation.encoding, size), smoothing))
+    };
+    let baked: Vec<Option<BakedPlane>> = planes.par_iter().zip(&allocation.sizes).map(bake_one).collect();
     let mut set = BakedSet::default();
     let mut index: Vec<Option<u32>> = Vec::with_capacity(baked.len());
     for plane in baked {
@@ -67,11 +68,11 @@ fn bake_sizes(
     set
 }
 
-/// The plane with a field of the given size; `None` where it would block nothing.
-fn baked(plane: &VotedPlane, size: (usize, usize), smoothing: usize) -> Option<BakedPlane> {
+/// The plane with a texture of the given size; `None` where it would block nothing.
+fn baked(plane: &VotedPlane, (encoding, size): (Encoding, (usize, usize)), smoothing: usize) -> Option<BakedPlane> {
     let votes: Vec<f32> = plane.votes[0].iter().zip(&plane.votes[1]).map(|(a, b)| a + b).collect();
     let grid = VoteGrid { votes: &votes, width: plane.width, height: plane.height };
-    let texture = VotedShape::new(grid, smoothing).field(size);
+    let texture = VotedShape::new(grid, smoothing).texture(encoding, size);
     let blocks = texture.texels.iter().any(|&texel| !texture.is_open(texel));
     let PlacedPlane { plane, side, bias } = plane.placed;
     blocks.then_some(BakedPlane { plane, texture, side, bias })

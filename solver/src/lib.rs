@@ -3,6 +3,7 @@
 //! Deterministic: the same input and seed give the same bytes at any thread count. No files, no GPU, no clock,
 //! no environment, no printing.
 
+pub mod baselines;
 pub mod budget;
 pub mod certificate;
 pub mod columns;
@@ -22,5 +23,6 @@ pub mod sampling;
 pub mod search;
 pub mod sections;
 pub mod shade;
+pub mod shadow_map;
 pub mod smoothing;
 pub mod visibility;

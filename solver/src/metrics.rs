@@ -43,7 +43,7 @@ pub struct WorstLight {
 
 /// Weighted errors of one light.
 #[derive(Clone, Copy, Default)]
-struct LightError {
+pub(crate) struct LightError {
     missed: f64,
     false_: f64,
 }
@@ -57,12 +57,30 @@ impl LightError {
             self.false_ -= vote * (1.0 - predicted);
         }
     }
+
+    /// Sums up what `predicted`, the visibility 0..1 of a pair, gets wrong.
+    pub(crate) fn of(light: &LightPairs, predicted: impl Fn(usize) -> f32) -> Self {
+        let mut error = Self::default();
+        light.vote.iter().enumerate().for_each(|(i, &vote)| error.add(vote, predicted(i)));
+        error
+    }
 }
 
 /// Measures planes with the shader's arithmetic, bilinear taps and all. `section_of` has one entry a receiver.
 #[must_use]
 pub fn measure(set: &BakedSet, pairs: &Pairs, section_of: &[u32]) -> Metrics {
-    let errors = pairs.lights.par_iter().map(|light| measure_light(set, light, section_of)).collect();
+    collect(pairs, |light| {
+        let (rows, lists) = (set_rows(set, light.light), set.lists(light.light));
+        LightError::of(light, |i| {
+            let list = &lists[section_of[light.receiver[i] as usize] as usize];
+            visibility(&set.planes, &rows, list, light.point(i))
+        })
+    })
+}
+
+/// Measures the errors of each light and sums them up.
+pub(crate) fn collect(pairs: &Pairs, error_of: impl Fn(&LightPairs) -> LightError + Send + Sync) -> Metrics {
+    let errors = pairs.lights.par_iter().map(error_of).collect();
     let lights: Vec<Vec3> = pairs.lights.iter().map(|light| light.light).collect();
     let metrics = from_errors(errors, &lights, (pairs.shadow_weight, pairs.total_weight));
     Metrics { receivers: pairs.receivers, ..metrics }
@@ -108,14 +126,4 @@ fn from_errors(errors: Vec<LightError>, lights: &[Vec3], (shadow, total): (f64, 
     let (max, direction) = by_light[count - 1];
     metrics.worst_light = WorstLight { max, p95: by_light[(count - 1) * 95 / 100].0, direction: direction.to_array() };
     metrics
-}
-
-fn measure_light(set: &BakedSet, light: &LightPairs, section_of: &[u32]) -> LightError {
-    let (rows, lists) = (set_rows(set, light.light), set.lists(light.light));
-    let mut error = LightError::default();
-    for i in 0..light.len() {
-        let list = &lists[section_of[light.receiver[i] as usize] as usize];
-        error.add(light.vote[i], visibility(&set.planes, &rows, list, light.point(i)));
-    }
-    error
 }

@@ -120,6 +120,14 @@ impl PairTable {
         self.lights.reserve(lights);
     }
 
+    /// The same pairs for lists that do not depend on the light: one direction stands for all.
+    #[must_use]
+    pub fn undirected(mut self) -> Self {
+        self.directions = 1;
+        self.lights.iter_mut().for_each(|rows| rows.direction = 0);
+        self
+    }
+
     /// Number of pairs.
     #[must_use]
     pub fn len(&self) -> usize {

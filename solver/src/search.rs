@@ -336,6 +336,11 @@ impl<'a> Search<'a> {
             }
             tilt *= 0.5;
         }
+        self.settled(pairs, at, scratch)
+    }
+
+    /// The plane with a tight rectangle, where that gains, and the bias that gains most.
+    fn settled(&self, pairs: &PairTable, mut at: Found, scratch: &mut Scratch) -> Found {
         if let Some(plane) = self.tight(pairs, &at.placed, ROOM[1], scratch) {
             let tight = PlacedPlane { plane, ..at.placed };
             let gain = self.gain(pairs, &tight, scratch);
@@ -446,6 +451,20 @@ pub fn place(mesh: &Mesh, table: &PairTable, planes: &[(ShadowPlane, Side)], opt
     let place = |scratch: &mut Scratch, &(plane, side): &(ShadowPlane, Side)| {
         let placed = PlacedPlane { plane, side, bias: BIAS };
         search.with_bias(&sample, Found { placed, gain: 0.0 }, scratch)
+    };
+    planes.par_iter().map_init(Scratch::default, place).collect()
+}
+
+/// Planes that another method placed, in its order: rectangles are made tight around what they block, and biases are
+/// those that gain most.
+#[must_use]
+pub fn place_loosely(mesh: &Mesh, table: &PairTable, planes: &[ShadowPlane], options: &SearchOptions) -> Vec<Found> {
+    let search = Search::new(mesh, table, options);
+    let sample = table.sample(options.scoring, options.seed);
+    let place = |scratch: &mut Scratch, plane: &ShadowPlane| {
+        let placed = placed_anew(*plane);
+        let gain = search.gain(&sample, &placed, scratch);
+        search.settled(&sample, Found { placed, gain }, scratch)
     };
     planes.par_iter().map_init(Scratch::default, place).collect()
 }

@@ -3,14 +3,14 @@
 
 use glam::{DVec3, Vec2, Vec3};
 use shadowfit_solver::{
-    budget::BudgetOptions,
+    budget::{BudgetOptions, Sizing},
     fit::bake,
     lights::LightDomain,
     lists::{ListOptions, assign},
     mesh::{Mesh, Sides, Soup},
     metrics::{Metrics, measure},
     pair_table::{PairTable, SampleSize},
-    plane::BakedSet,
+    plane::{BakedSet, Encoding},
     receivers::{ReceiverOptions, Receivers, sample},
     sampling::uniform,
     search::{Found, SearchOptions, Selection, Verdict, search},
@@ -55,6 +55,8 @@ pub fn fit_options(domain: LightDomain, max_planes: usize, seed: u64) -> FitOpti
         min_gain: 0.005,
         lists: ListOptions { max_lookups: usize::MAX, grid: 255, rounds: 3, smoothing: 2 },
         budget: BudgetOptions {
+            encoding: Some(Encoding::Sdf),
+            sizing: Sizing::ByGain,
             max_planes: usize::MAX,
             bytes: 1 << 20,
             texture_size: 128,
