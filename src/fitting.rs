@@ -67,6 +67,9 @@ pub(crate) struct Fitted {
     pub certificate: Option<Certificate>,
 }
 
+/// Planes per section, and the smaller sets of a whole model with the seconds at which they were found.
+type Searched = (Vec<Vec<Found>>, Vec<(BakedSet, f64)>);
+
 /// Everything a fit works on.
 struct Fit<'a> {
     request: &'a FitRequest,
@@ -190,7 +193,7 @@ fn section_of_scene(scene: &Scene, mesh: &Mesh, section_of: &[u32]) -> Vec<u32> 
 
 impl Fit<'_> {
     /// Planes per section, and the smaller sets of a whole model.
-    fn search(&self, progress: &mut dyn FnMut(String)) -> Result<(Vec<Vec<Found>>, Vec<(BakedSet, f64)>), AssetError> {
+    fn search(&self, progress: &mut dyn FnMut(String)) -> Result<Searched, AssetError> {
         let Plan { search: options, min_gain, .. } = &self.plan;
         if let Some(path) = &self.request.planes {
             let rectangles = asset::read_plane_file(path)?;
@@ -208,11 +211,7 @@ impl Fit<'_> {
         Ok((self.tables.par_iter().map(search).collect(), Vec::new()))
     }
 
-    fn search_whole(
-        &self,
-        table: &PairTable,
-        progress: &mut dyn FnMut(String),
-    ) -> (Vec<Vec<Found>>, Vec<(BakedSet, f64)>) {
+    fn search_whole(&self, table: &PairTable, progress: &mut dyn FnMut(String)) -> Searched {
         let start = Instant::now();
         let sample = table.sample(CURVE_SAMPLE, self.request.seed);
         let quick = ListOptions { rounds: 1, ..self.plan.lists };

@@ -72,24 +72,6 @@ impl LightPairs {
         self.receiver.push(receiver);
         self.vote.push(vote);
     }
-
-    /// The pairs for which `vote(index)` gives one, in order, with that vote.
-    #[must_use]
-    pub fn revoted(&self, mut vote: impl FnMut(usize) -> Option<f32>) -> Self {
-        let mut out = Self::with_capacity(self.light, self.len() / 2);
-        for i in 0..self.len() {
-            if i == self.split {
-                out.split = out.len();
-            }
-            if let Some(vote) = vote(i) {
-                out.push(self.point(i), self.receiver[i], vote);
-            }
-        }
-        if self.split == self.len() {
-            out.split = out.len();
-        }
-        out
-    }
 }
 
 impl Pairs {
