@@ -133,10 +133,11 @@ pub(crate) fn pilot(request: &FitRequest, mesh: &Mesh) -> (Receivers, Pairs) {
 /// The preset's numbers with the user's; one section where a quick search shows that it will do.
 pub(crate) fn plan(request: &FitRequest, mesh: &Mesh, pilot: &Pairs) -> Plan {
     let effort = &request.effort;
-    let counted = request.max_planes.is_some() || request.max_error.is_some() || request.planes.is_some();
+    let counted = request.max_planes.is_some() || request.max_error.is_some();
     let listed = request.max_lookups.is_some() || request.texture_budget.is_some();
     let one_list = request.certificate.is_some() || (counted && !listed);
     let whole = match request.sections {
+        _ if request.planes.is_some() => true,
         Some(count) => count == 1,
         None => pilot.shadow_weight <= 0.0 || one_list || is_simple(request, mesh, pilot),
     };

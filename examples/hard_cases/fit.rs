@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
+use shadowfit::effort::Effort;
 use shadowfit_solver::{
     budget::BudgetOptions,
     fit::bake,
@@ -98,8 +99,7 @@ pub fn fit(soup: &Soup, settings: &Settings) -> Fitted {
         assign(table, &planes, &lists)
     };
     let fits: Vec<_> = tables.par_iter().map(fit_section).collect();
-    let budget =
-        BudgetOptions { max_planes: usize::MAX, bytes: 1 << 20, texture_size: 128, byte_gain: 2e-9, smoothing: 1 };
+    let budget = BudgetOptions { bytes: 1 << 20, byte_gain: 2e-9, ..Effort::balanced().whole.budget };
     let set = bake(&fits, &directions, shadow, &budget);
     Fitted { mesh, set, section_of, domain }
 }

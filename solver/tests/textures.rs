@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use shadowfit_solver::{
-    budget::{BudgetOptions, Sizing, allocate},
+    budget::{self, Allocation, BudgetOptions, Offers, Sizing},
     field::{VoteGrid, VotedShape, blocked_votes},
     lists::VotedPlane,
     plane::{Encoding, OccluderTexture, PlacedPlane, ShadowPlane, Side},
@@ -44,6 +44,11 @@ fn plane(votes: [Vec<f32>; 2]) -> VotedPlane {
 
 fn is_ring(i: usize, size: usize) -> bool {
     [i % size, i / size].iter().any(|&k| k == 0 || k + 1 == size)
+}
+
+/// Offers and sizes at once.
+fn allocate(planes: &[&VotedPlane], shadow_weight: f64, options: &BudgetOptions) -> Allocation {
+    budget::allocate(&Offers::new(planes, options), shadow_weight, options)
 }
 
 #[test]
