@@ -138,7 +138,7 @@ fn trace_light(
     for fold in 0..2 {
         pairs.split = if fold == 1 { pairs.len() } else { 0 };
         for i in (fold..receivers.points.len()).step_by(2) {
-            if stride > 1 && hash(index as u64, i as u64) % stride as u64 != 0 {
+            if stride > 1 && !hash(index as u64, i as u64).is_multiple_of(stride as u64) {
                 continue;
             }
             let cosine = receivers.normals[i].dot(light);
