@@ -52,6 +52,9 @@ const CURVE_SAMPLE: SampleSize = SampleSize { lights: 1024, pairs: 1_500_000 };
 /// Shares of the textures' bytes at which a divided model's error is told.
 const CURVE_BUDGETS: [f64; 4] = [1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0];
 
+/// Smaller sets, each with the seconds into the search at which it was found.
+type Smaller = Vec<(BakedSet, f64)>;
+
 /// What search and bake leave behind.
 pub(crate) struct Fitted {
     pub set: BakedSet,
@@ -59,8 +62,8 @@ pub(crate) struct Fitted {
     pub section_of: Vec<u32>,
     /// Planes as searched, all sections in turn.
     pub searched: Vec<Found>,
-    /// Smaller sets, each with the seconds into the search at which it was found.
-    pub smaller: Vec<(BakedSet, f64)>,
+    /// Fewer planes or bytes.
+    pub smaller: Smaller,
     /// On the pairs that decided the planes.
     pub training: Metrics,
 }
@@ -173,7 +176,7 @@ fn section_of_scene(scene: &Scene, mesh: &Mesh, section_of: &[u32]) -> Vec<u32> 
 
 impl Fit<'_> {
     /// Planes per section, and the smaller sets of a whole model.
-    fn search(&self, progress: &mut dyn FnMut(String)) -> Result<(Vec<Vec<Found>>, Vec<(BakedSet, f64)>), AssetError> {
+    fn search(&self, progress: &mut dyn FnMut(String)) -> Result<(Vec<Vec<Found>>, Smaller), AssetError> {
         let Plan { search: options, min_gain, .. } = &self.plan;
         if let Some(path) = &self.request.planes {
             let rectangles = asset::read_plane_file(path)?;
@@ -191,11 +194,7 @@ impl Fit<'_> {
         Ok((self.tables.par_iter().map(search).collect(), Vec::new()))
     }
 
-    fn search_whole(
-        &self,
-        table: &PairTable,
-        progress: &mut dyn FnMut(String),
-    ) -> (Vec<Vec<Found>>, Vec<(BakedSet, f64)>) {
+    fn search_whole(&self, table: &PairTable, progress: &mut dyn FnMut(String)) -> (Vec<Vec<Found>>, Smaller) {
         let start = Instant::now();
         let sample = table.sample(CURVE_SAMPLE, self.request.seed);
         let quick = ListOptions { rounds: 1, ..self.plan.lists };
@@ -225,7 +224,7 @@ impl Fit<'_> {
     }
 
     /// The set, and sets of fewer planes or bytes.
-    fn bake(&self, searched: &[Vec<Found>], mut smaller: Vec<(BakedSet, f64)>) -> (BakedSet, Vec<(BakedSet, f64)>) {
+    fn bake(&self, searched: &[Vec<Found>], mut smaller: Smaller) -> (BakedSet, Smaller) {
         let fits: Vec<SectionFit> = self
             .tables
             .par_iter()
