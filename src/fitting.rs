@@ -164,7 +164,7 @@ fn is_simple(request: &FitRequest, mesh: &Mesh, pilot: &Pairs) -> bool {
     let max_planes = request.max_lookups.unwrap_or(request.effort.divided.lists.max_lookups);
     let directions = request.domain.directions(PILOT.2 / 4, request.seed);
     let table = PairTable::new(pilot, &directions);
-    let options = SearchOptions { max_planes, seed: request.seed, replace_rounds: 0, ..plan.search };
+    let options = SearchOptions { max_planes, seed: request.seed, replace_rounds: 1, ..plan.search };
     let found = search(mesh, &table, &options, plan.min_gain * pilot.shadow_weight, &mut |_| Verdict::Continue);
     let fits = [assign(&table, &found.planes, &ListOptions { max_lookups: max_planes, grid: 128, ..plan.lists })];
     let set = bake(&fits, &directions, pilot.shadow_weight, &plan.budget);

@@ -47,7 +47,7 @@ fn the_outermost_ring_is_open() {
     let grid = VoteGrid { votes: &votes, width: 60, height: 40 };
     for (w, h) in SIZES {
         let field = VotedShape::new(grid, 2).field((w, h));
-        let on_ring = |i: usize| i % w == 0 || i % w == w - 1 || i < w || i >= w * (h - 1);
+        let on_ring = |i: usize| i.is_multiple_of(w) || i % w == w - 1 || i < w || i >= w * (h - 1);
         assert!((0..w * h).filter(|i| on_ring(*i)).all(|i| field.is_open(field.texels[i])), "{w} x {h}");
         assert!((0..w * h).filter(|i| !on_ring(*i)).all(|i| !field.is_open(field.texels[i])), "{w} x {h} has a hole");
     }
@@ -82,7 +82,7 @@ fn unimproved(votes: &[f32], (gw, gh): (usize, usize), (w, h): (usize, usize)) -
         let quarters = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)];
         let mean =
             quarters.map(|(dx, dy)| bilinear((x + dx) / sx - 0.5, (y + dy) / sy - 0.5)).iter().sum::<f32>() / 4.0;
-        let on_ring = i % w == 0 || i % w == w - 1 || i < w || i >= w * (h - 1);
+        let on_ring = i.is_multiple_of(w) || i % w == w - 1 || i < w || i >= w * (h - 1);
         let border = SDF_BORDER * 255.0;
         (border + border * mean / range).round().clamp(0.0, if on_ring { border.floor() } else { 255.0 }) as u8
     };

@@ -49,7 +49,7 @@ struct Divided {
 }
 
 fn divided() -> Divided {
-    let mesh = Mesh::new(&knot_soup()).unwrap();
+    let mesh = Mesh::new(&knot_soup()).expect("the knot has triangles");
     let options = options(1);
     let pilot = scenes::receivers(&mesh, 2_000, 9);
     let pilot_pairs = pairs(&mesh, &Sampling { receivers: 2_000, lights: 48, seed: 9, ..TRAINING });
