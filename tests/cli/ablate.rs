@@ -38,8 +38,8 @@ fn tables_of_all_methods() {
     let error = |method: &str, planes| rows[&(method.to_owned(), planes)][1];
     for method in ["shadowfit", "without refinement", "without re-bake", "coverage only", "placed by hand"] {
         assert!(error(method, 1) < 0.1, "{method}: {rows:?}");
-        assert!(!rows.contains_key(&(method.to_owned(), 2)), "{method}: {rows:?}");
     }
+    assert!(!rows.contains_key(&("placed by hand".to_owned(), 2)), "{rows:?}");
     for method in ["billboard cloud", "stochastic billboards", "k-means"] {
         assert!(error(method, 2) < 0.1, "{method}: {rows:?}");
     }
@@ -78,7 +78,7 @@ fn tables_of_all_methods() {
 #[test]
 fn rows_of_a_divided_model() {
     let folder = tempfile::tempdir().unwrap();
-    ablate(folder.path(), &["--sections", "2", "--max-planes", "1"]).ok();
+    ablate(folder.path(), &["--sections", "2"]).ok();
     let files = contents(folder.path());
     let rows = rows(std::str::from_utf8(&files["plate_over_ground.ablation.csv"]).unwrap());
     let divided = ["2 sections", "2 sections: coverage only", "2 sections: without re-bake"];
