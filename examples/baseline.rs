@@ -3,9 +3,11 @@
 //!     cargo build --release --features flip
 //!     cargo run --release --features flip --example baseline
 //!     cargo run --release --features flip --example baseline -- CORPUS_DIR
+//!     cargo run --release --features flip --example baseline -- CORPUS_DIR settings
 //!
 //! Each case is one run of the release binary beside this example, so that time and memory are its own. The first
-//! writes `reports/baseline/models.{csv,md}`: preset balanced; the second `reports/baseline/corpus.{csv,md}`: preset fast.
+//! writes `reports/baseline/models.{csv,md}`: preset balanced; the second `reports/baseline/corpus.{csv,md}`: preset fast;
+//! the third `reports/baseline/settings.{csv,md}`: lookups and bytes against error, preset balanced without frames.
 //! Frames are those of the short validation: the full one takes a minute and more a case without a GPU.
 
 use serde_json::Value;
@@ -25,10 +27,12 @@ struct Case {
 }
 
 /// Columns of the tables: title, and where the report has the number.
-const COLUMNS: [(&str, &str); 14] = [
+const COLUMNS: [(&str, &str); 16] = [
     ("triangles", "/triangles"),
+    ("sections", "/sections"),
     ("planes", "/planes"),
     ("lookups", "/lookups/mean"),
+    ("max_lookups", "/lookups/max"),
     ("shadow_error", "/held_out/shadow_error"),
     ("missed", "/held_out/missed"),
     ("false", "/held_out/false"),
@@ -47,9 +51,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     if !binary.exists() {
         return Err(format!("{} is missing: cargo build --release --features flip", binary.display()).into());
     }
-    match std::env::args().nth(1) {
-        None => run("models", &own_cases(), &binary, "balanced"),
-        Some(folder) => run("corpus", &corpus_cases(Path::new(&folder))?, &binary, "fast"),
+    match (std::env::args().nth(1), std::env::args().nth(2).as_deref()) {
+        (None, _) => run("models", &own_cases(), &binary, &["--preset", "balanced"]),
+        (Some(folder), Some("settings")) => {
+            run("settings", &settings_cases(Path::new(&folder))?, &binary, &["--validate", "none"])
+        }
+        (Some(_), Some(other)) => Err(format!("{other}: only 'settings' is known").into()),
+        (Some(folder), None) => run("corpus", &corpus_cases(Path::new(&folder))?, &binary, &["--preset", "fast"]),
     }
 }
 
@@ -105,8 +113,55 @@ fn corpus_cases(folder: &Path) -> Result<Vec<Case>, Box<dyn Error>> {
     Ok(cases)
 }
 
+/// The settings that users weigh: lookups and bytes against error.
+fn settings_cases(folder: &Path) -> Result<Vec<Case>, Box<dyn Error>> {
+    let all = corpus_cases(folder)?;
+    let find = |name: &str| all.iter().find(|case| case.name.ends_with(name)).map(|case| (&case.model, &case.name));
+    let mut cases = Vec::new();
+    let mut add = |(model, name): (&PathBuf, &String), arguments: &str| {
+        let arguments: Vec<String> = arguments.split_whitespace().map(str::to_string).collect();
+        cases.push(Case { name: format!("{name} {}", arguments.join(" ")), model: model.clone(), arguments });
+    };
+    let teapot = find("teapot_three.glb").ok_or("teapot_three.glb is missing")?;
+    for arguments in TEAPOT_SETTINGS {
+        add(teapot, arguments);
+    }
+    for (name, settings) in OTHER_SETTINGS {
+        let model = find(name).ok_or_else(|| format!("{name} is missing"))?;
+        for arguments in settings {
+            add(model, arguments);
+        }
+    }
+    Ok(cases)
+}
+
+/// Of the three.js teapot.
+const TEAPOT_SETTINGS: [&str; 8] = [
+    "--preset fast --max-planes 11",
+    "--preset balanced --max-planes 11",
+    "--preset best --max-planes 11",
+    "--preset balanced --max-lookups 2 --texture-budget 2M",
+    "--preset balanced --max-lookups 4 --texture-budget 512K",
+    "--preset balanced --max-lookups 4 --texture-budget 2M",
+    "--preset best --max-lookups 4 --texture-budget 2M",
+    "--preset best --max-lookups 8 --texture-budget 8M",
+];
+
+/// Of further models.
+const OTHER_SETTINGS: [(&str, &[&str]); 7] = [
+    ("j31_twintail.glb", &["--preset balanced --max-lookups 4 --texture-budget 2M"]),
+    ("cesium_air.glb", &BOTH),
+    ("b787_lowpoly.glb", &BOTH),
+    ("office_chair.glb", &BOTH),
+    ("lantern_geom.glb", &BOTH),
+    ("stanford_bunny.glb", &BOTH),
+    ("car.glb", &BOTH),
+];
+
+const BOTH: [&str; 2] = ["--preset balanced --max-planes 8", "--preset balanced --max-lookups 4"];
+
 /// Runs the cases and writes the tables after each, so that a run that is cut short leaves what it has.
-fn run(table: &str, cases: &[Case], binary: &Path, preset: &str) -> Result<(), Box<dyn Error>> {
+fn run(table: &str, cases: &[Case], binary: &Path, common: &[&str]) -> Result<(), Box<dyn Error>> {
     let titles: Vec<&str> = COLUMNS.iter().map(|(title, _)| *title).collect();
     let mut csv = format!("case,exit,{}\n", titles.join(","));
     let mut markdown = format!("| case | exit | {} |\n|---|{}\n", titles.join(" | "), "---|".repeat(titles.len() + 1));
@@ -114,7 +169,9 @@ fn run(table: &str, cases: &[Case], binary: &Path, preset: &str) -> Result<(), B
     for case in cases {
         let out = tempfile::tempdir()?;
         let output = Command::new(binary)
-            .args(["fit", "--json", "--preset", preset, "-o"])
+            .args(["fit", "--json"])
+            .args(common)
+            .arg("-o")
             .arg(out.path())
             .arg(&case.model)
             .args(&case.arguments)
