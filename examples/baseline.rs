@@ -149,7 +149,10 @@ const TEAPOT_SETTINGS: [&str; 8] = [
 
 /// Of further models.
 const OTHER_SETTINGS: [(&str, &[&str]); 7] = [
-    ("j31_twintail.glb", &["--preset balanced --max-lookups 4 --texture-budget 2M"]),
+    (
+        "j31_twintail.glb",
+        &["--preset balanced --max-lookups 4 --texture-budget 2M", "--preset best --max-lookups 4 --texture-budget 2M"],
+    ),
     ("cesium_air.glb", &BOTH),
     ("b787_lowpoly.glb", &BOTH),
     ("office_chair.glb", &BOTH),

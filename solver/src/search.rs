@@ -18,15 +18,16 @@
 //! Guaranteed: the result depends on the input alone, not on threads. Not guaranteed: optimality.
 
 use crate::{
-    mesh::{Mesh, ray_origin},
+    mesh::Mesh,
     pair_table::{LightRows, PairTable, SPARE, SampleSize},
     plane::{PlacedPlane, ShadowPlane, Side},
-    rectangle::{around_section, enlarged, shifted, tight_around},
-    sampling::{hash, uniform},
+    proposals::{Place, propose},
+    rectangle::{enlarged, shifted, tight_around},
+    sampling::hash,
     shade::CastingPlane,
     smoothing::smoothed,
+    window::{Scratch, window_votes, windowed},
 };
-use glam::Vec3;
 use rayon::prelude::*;
 
 /// How hard to search.
@@ -95,9 +96,6 @@ pub const BIAS: f32 = 0.01;
 /// still clears receivers that lie *on* the plane (computed up to 5e-5 beside it).
 pub const BIASES: [f32; 6] = [5e-4, 2e-3, 5e-3, BIAS, 0.02, 0.04];
 
-/// Rounds of deciding the texture and the window in turn.
-const WINDOW_ROUNDS: usize = 2;
-
 /// First tilt of the refinement, radians: planes through the middle of a blocker are off by about this.
 const FIRST_TILT: f32 = 0.12;
 
@@ -111,35 +109,11 @@ const TIGHTER_IS_WORTH: f64 = 0.98;
 /// A replacement must gain this much more (relative): less is noise and would never settle.
 const REPLACE_MARGIN: f64 = 2e-3;
 
-/// Blockers thicker than this are cut here, unit space: the middle of a large body is far from what casts.
-const MAX_THICKNESS: f32 = 0.4;
-
-/// A flat model has a box without thickness: sections of it get some.
-const PAD: f32 = 1e-3;
-
-/// Rays start this far from the receiver when its blocker is looked up, unit space.
-const LOOKUP_OFFSET: f32 = 1e-4;
-
 /// Everything a search needs, borrowed.
 struct Search<'a> {
-    mesh: &'a Mesh,
+    place: Place<'a>,
     table: &'a PairTable,
     options: &'a SearchOptions,
-    low: Vec3,
-    high: Vec3,
-}
-
-/// Memory for one measurement, kept from one to the next.
-#[derive(Default)]
-struct Scratch {
-    /// Texel of each pair.
-    texels: Vec<u16>,
-    /// Votes per texel, the folds one after the other.
-    votes: Vec<f32>,
-    /// 1 where a texture decided by a fold blocks.
-    blocked: Vec<f32>,
-    /// Gain per direction; the window is where it is positive.
-    gains: Vec<f32>,
 }
 
 /// A texture with its window.
@@ -178,10 +152,7 @@ pub fn search(
 
 impl<'a> Search<'a> {
     fn new(mesh: &'a Mesh, table: &'a PairTable, options: &'a SearchOptions) -> Self {
-        let corners = || mesh.corners.iter().flatten();
-        let low = corners().fold(Vec3::INFINITY, |a, p| a.min(*p)) - PAD;
-        let high = corners().fold(Vec3::NEG_INFINITY, |a, p| a.max(*p)) + PAD;
-        Self { mesh, table, options, low, high }
+        Self { place: Place::new(mesh), table, options }
     }
 
     fn greedy(&self, min_gain: f64, judge: &mut dyn FnMut(&[Found]) -> Verdict) -> (Vec<Found>, Verdict) {
@@ -292,7 +263,7 @@ impl<'a> Search<'a> {
         let o = self.options;
         let scoring = &open.sample(o.scoring, seed);
         let screening = &scoring.sample(o.screening, hash(seed, 1));
-        let wide: Vec<ShadowPlane> = self.proposals(scoring, seed);
+        let wide: Vec<ShadowPlane> = propose(&self.place, scoring, o.proposals, seed);
         let screened = measured(wide, |plane, scratch| {
             Some((windowed(screening, &placed_anew(*plane), o.screening_texels, scratch), *plane))
         });
@@ -400,47 +371,6 @@ impl<'a> Search<'a> {
         let parts: Vec<Vec<bool>> = self.table.lights.par_iter().map(of_light).collect();
         parts.concat()
     }
-
-    /// Planes through the blockers of a few blocked pairs, drawn by their votes; rectangles across the whole model.
-    fn proposals(&self, pairs: &PairTable, seed: u64) -> Vec<ShadowPlane> {
-        let total: f64 = pairs.vote.iter().map(|vote| f64::from(vote.max(0.0))).sum();
-        let step = total * PER_BLOCKER as f64 / self.options.proposals.max(1) as f64;
-        let mut due = step * uniform(seed, 1);
-        let mut drawn = Vec::new();
-        for rows in &pairs.lights {
-            for i in rows.start..rows.end {
-                due -= f64::from(pairs.vote[i].max(0.0));
-                if due < 0.0 && pairs.vote[i] > 0.0 {
-                    due += step * (-due / step).ceil();
-                    drawn.push((pairs.point(i), rows.light));
-                }
-            }
-        }
-        let planes = |(k, (point, light)): (usize, &(Vec3, Vec3))| {
-            self.through_blocker(*point, *light, hash(seed, 2 + k as u64))
-        };
-        drawn.par_iter().enumerate().flat_map_iter(planes).collect()
-    }
-
-    fn through_blocker(&self, point: Vec3, light: Vec3, seed: u64) -> Vec<ShadowPlane> {
-        let Some(hit) = self.mesh.nearest(point + light * LOOKUP_OFFSET, light, |_, _| true) else { return Vec::new() };
-        let surface = self.mesh.normals[hit.triangle as usize];
-        let inward = if surface.dot(light) > 0.0 { surface } else { -surface };
-        let entry = point + light * (LOOKUP_OFFSET + hit.distance);
-        let thickness =
-            self.mesh.nearest(ray_origin(entry, inward), inward, |_, _| true).map_or(0.0, |hit| hit.distance);
-        let middle = entry + inward * (0.5 * thickness.min(MAX_THICKNESS));
-        let (t, b) = surface.any_orthonormal_pair();
-        let (sin, cos) = (std::f64::consts::TAU * uniform(seed, 0)).sin_cos();
-        let across = t * cos as f32 + b * sin as f32;
-        let y = 2.0 * uniform(seed, 1) - 1.0;
-        let (sin, cos) = (std::f64::consts::TAU * uniform(seed, 2)).sin_cos();
-        let r = (1.0 - y * y).sqrt();
-        let any = Vec3::new((r * cos) as f32, y as f32, (r * sin) as f32);
-        let axis = Vec3::AXES[(hash(seed, 3) % 3) as usize];
-        let normals: [Vec3; PER_BLOCKER] = [surface, across, light, axis, any];
-        normals.iter().filter_map(|n| around_section(self.low, self.high, *n, n.dot(middle))).collect()
-    }
 }
 
 /// Planes that a person placed, in their order, with the biases that gain most.
@@ -479,9 +409,6 @@ fn least(gains: &[f64]) -> Option<(usize, f64)> {
     gains.iter().copied().enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Planes proposed through one blocker.
-const PER_BLOCKER: usize = 5;
-
 /// Measures planes in parallel; the best first, the earlier one of equals.
 fn measured(
     planes: Vec<ShadowPlane>,
@@ -491,51 +418,4 @@ fn measured(
         planes.par_iter().map_init(Scratch::default, |scratch, plane| measure(plane, scratch)).flatten().collect();
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     scored
-}
-
-/// Drop of the weighted error by a plane with a texture of `n` x `n` that is read only where it gains, counted under
-/// lights that did not decide the texture. Leaves texels and gains per direction in `scratch`.
-fn windowed(pairs: &PairTable, placed: &PlacedPlane, n: usize, scratch: &mut Scratch) -> f64 {
-    pairs.crossings(placed, (n, n), &mut scratch.texels);
-    let count = n * n + SPARE;
-    let Scratch { texels, votes, blocked, gains } = scratch;
-    gains.clear();
-    gains.resize(pairs.directions, 1.0);
-    for _ in 0..WINDOW_ROUNDS {
-        votes.clear();
-        votes.resize(2 * count, 0.0);
-        for rows in pairs.lights.iter().filter(|rows| gains[rows.direction] > 0.0) {
-            let votes = &mut votes[rows.fold * count..][..count];
-            for (&texel, &vote) in texels[rows.start..rows.end].iter().zip(&pairs.vote[rows.start..rows.end]) {
-                votes[texel as usize] += vote;
-            }
-        }
-        blocked.clear();
-        blocked.resize(2 * count, 0.0);
-        for fold in 0..2 {
-            let smooth = smoothed(&votes[fold * count..][..n * n], n);
-            for (blocked, vote) in blocked[fold * count..].iter_mut().zip(smooth) {
-                *blocked = f32::from(u8::from(vote > 0.0));
-            }
-        }
-        gains.fill(0.0);
-        for rows in &pairs.lights {
-            let blocked = &blocked[(1 - rows.fold) * count..][..count];
-            let pairs = texels[rows.start..rows.end].iter().zip(&pairs.vote[rows.start..rows.end]);
-            gains[rows.direction] += pairs.map(|(&texel, vote)| vote * blocked[texel as usize]).sum::<f32>();
-        }
-    }
-    gains.iter().map(|gain| f64::from(gain.max(0.0))).sum()
-}
-
-/// Votes per texel of all pairs in the window that [`windowed`] left in `scratch`.
-fn window_votes(pairs: &PairTable, n: usize, scratch: &Scratch) -> Vec<f32> {
-    let mut votes = vec![0.0f32; n * n + SPARE];
-    for rows in pairs.lights.iter().filter(|rows| scratch.gains[rows.direction] > 0.0) {
-        for (&texel, &vote) in scratch.texels[rows.start..rows.end].iter().zip(&pairs.vote[rows.start..rows.end]) {
-            votes[texel as usize] += vote;
-        }
-    }
-    votes.truncate(n * n);
-    votes
 }
