@@ -223,9 +223,9 @@ fn a_validated_fit_compares_frames() {
     assert!(image["renderer"].as_str().unwrap().starts_with("wgpu:"), "{image}");
     let [error, missed, false_] = ["/mask_error", "/missed", "/false"].map(|pointer| number(image, pointer));
     assert!((error - missed - false_).abs() < 1e-12, "{image}");
-    // One plane answers this model (its shadow_error is 0.01, and less than all of the picture is in shadow); frames
+    // One plane answers this model (under its worst light, a grazing one, `fast` misses 0.021 of the picture); frames
     // of a wrong scale, side or light would be wrong in every pixel of the shadow, 5 to 20 % of the picture.
-    assert!(error < 0.02, "{image}");
+    assert!(error < 0.03, "{image}");
     assert_eq!((number(image, "/frames"), number(image, "/size_px")), (8.0, 512.0));
     let flip = &image["flip_mean"];
     // FLIP of unequal pictures is above 0, of such similar ones below 0.1 (one pixel in ten wrong altogether).

@@ -23,7 +23,7 @@ fn usage_errors_end_with_1() {
         fit(&["--max-error", "1.5"]),
         fit(&["--max-error", "nan"]),
         fit(&["--texture-size", "4"]),
-        fit(&["--texture-size", "256"]),
+        fit(&["--texture-size", "257"]),
         fit(&["--max-lookups", "0"]),
         fit(&["--max-lookups", "65"]),
         fit(&["--max-lookups", "few"]),

@@ -137,7 +137,7 @@ fn without_an_adapter_the_cpu_validates_and_draws() {
     assert!(outcome.stdout.contains("cpu"), "the table does not say that the CPU drew: {outcome:?}");
     let report = crate::program::report(folder.path(), "plate_over_ground");
     assert_eq!(report["image"]["renderer"], "cpu");
-    assert!(report["image"]["mask_error"].as_f64().unwrap() < 0.02, "{}", report["image"]);
+    assert!(report["image"]["mask_error"].as_f64().unwrap() < 0.03, "{}", report["image"]);
 
     let asset = folder.path().join("plate_over_ground.shadow.glb");
     for mode in ["mask", "shaded"] {
