@@ -23,8 +23,6 @@ pub struct LightPairs {
     pub receiver: Vec<u32>,
     /// `+w` where blocked, `-w` where lit; `w = area x exposure x n.l x solid angle`.
     pub vote: Vec<f32>,
-    /// Pairs before this index belong to fold 0, those from it on to fold 1 (every other receiver).
-    pub split: usize,
 }
 
 /// All pairs of a set of receivers and lights.
@@ -62,7 +60,7 @@ impl LightPairs {
     fn with_capacity(light: Vec3, capacity: usize) -> Self {
         let column = || Vec::with_capacity(capacity);
         let receiver = Vec::with_capacity(capacity);
-        Self { light, x: column(), y: column(), z: column(), receiver, vote: column(), split: 0 }
+        Self { light, x: column(), y: column(), z: column(), receiver, vote: column() }
     }
 
     fn push(&mut self, p: Vec3, receiver: u32, vote: f32) {
@@ -118,7 +116,6 @@ fn trace_light(
 ) -> LightPairs {
     let mut pairs = LightPairs::with_capacity(light, receivers.points.len() / 2 / stride);
     for fold in 0..2 {
-        pairs.split = if fold == 1 { pairs.len() } else { 0 };
         for i in (fold..receivers.points.len()).step_by(2) {
             if stride > 1 && !hash(index as u64, i as u64).is_multiple_of(stride as u64) {
                 continue;

@@ -93,7 +93,7 @@ fn tiny(seed: u64, planes: usize) -> (PairTable, Vec<PoolPlane>) {
 
 fn empty(light: Vec3) -> LightPairs {
     let column = Vec::new;
-    LightPairs { light, x: column(), y: column(), z: column(), receiver: Vec::new(), vote: column(), split: 0 }
+    LightPairs { light, x: column(), y: column(), z: column(), receiver: Vec::new(), vote: column() }
 }
 
 /// `[plane][pair]`: the texel that a pair crosses, if any.
