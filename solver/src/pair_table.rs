@@ -11,7 +11,7 @@ use crate::{
     shade::{CastingPlane, PlaneRows},
     visibility::Pairs,
 };
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use pulp::Arch;
 
 /// The rows of one light in a [`PairTable`].
@@ -48,6 +48,8 @@ pub struct PairTable {
     pub directions: usize,
     /// Receivers that the pairs were made from.
     pub receivers: usize,
+    /// The box of the receivers: its lowest and its highest corner.
+    pub bounds: [Vec3; 2],
 }
 
 /// How many pairs a sample takes.
@@ -70,6 +72,9 @@ const LANES: usize = 16;
 /// 2^23: added to a float of 0..2^23 it leaves the integer part, rounded to nearest, in the low 23 bits. A plain `as`
 /// conversion saturates, which no vector instruction does.
 const TO_INTEGER: f32 = 8_388_608.0;
+
+/// What rounding may add to a bound, as a share of the terms it is summed from.
+const BOUND_ERROR: f32 = 1e-6;
 
 /// Most texels of a grid: an index and its spare must fit 16 bits.
 pub const MAX_TEXELS: usize = (1 << 16) - SPARE;
@@ -99,6 +104,8 @@ impl PairTable {
             let end = table.len();
             table.lights.push(LightRows { light: light.light, direction, fold: position % 2, start, end });
         }
+        let points = || (0..table.len()).map(|i| table.point(i));
+        table.bounds = [points().fold(Vec3::INFINITY, Vec3::min), points().fold(Vec3::NEG_INFINITY, Vec3::max)];
         table
     }
 
@@ -156,7 +163,8 @@ impl PairTable {
 
     /// The rows of every `stride`-th light from the `first` on, of which `vote` gives a vote.
     fn picked(&self, (first, stride): (usize, usize), mut vote: impl FnMut(usize) -> Option<f32>) -> Self {
-        let mut out = Self { directions: self.directions, receivers: self.receivers, ..Self::default() };
+        let Self { directions, receivers, bounds, .. } = *self;
+        let mut out = Self { directions, receivers, bounds, ..Self::default() };
         for rows in self.lights.iter().skip(first).step_by(stride) {
             let start = out.len();
             for i in (rows.start..rows.end).filter(|i| self.vote[*i] != 0.0) {
@@ -174,12 +182,6 @@ impl PairTable {
         out
     }
 
-    /// The pairs for which `keep(pair)`.
-    #[must_use]
-    pub fn filtered(&self, mut keep: impl FnMut(usize) -> bool) -> Self {
-        self.picked((0, 1), |i| keep(i).then(|| self.vote[i]))
-    }
-
     /// The pairs for which `vote(pair)` gives one, with that vote.
     #[must_use]
     pub fn revoted(&self, vote: impl FnMut(usize) -> Option<f32>) -> Self {
@@ -190,23 +192,32 @@ impl PairTable {
     /// mostly of receivers that nothing ever shadows, are drawn where the decisions are.
     #[must_use]
     pub fn sample(&self, size: SampleSize, seed: u64) -> Self {
+        self.sample_where(size, seed, |_| true)
+    }
+
+    /// The same of the pairs for which `keep(pair)`. Only the lights of the sample are read.
+    #[must_use]
+    pub fn sample_where(&self, size: SampleSize, seed: u64, keep: impl Fn(usize) -> bool) -> Self {
         // An odd stride keeps both folds.
         let stride = (self.lights.len() / size.lights.max(1)).max(1) | 1;
         let first = (uniform(seed, 2) * stride as f64) as usize;
         let mut shares = vec![[0.0f32; 2]; self.receivers];
         let mut blocked = 0usize;
-        for (&vote, &receiver) in self.vote.iter().zip(&self.receiver) {
-            let share = &mut shares[receiver as usize];
-            share[0] += vote.max(0.0);
-            share[1] += vote.abs();
-            blocked += usize::from(vote > 0.0);
+        for i in (0..self.len()).filter(|i| keep(*i)) {
+            let share = &mut shares[self.receiver[i] as usize];
+            share[0] += self.vote[i].max(0.0);
+            share[1] += self.vote[i].abs();
         }
         let importance: Vec<f32> = shares.iter().map(|[b, t]| if *t > 0.0 { b / t + LIT_FLOOR } else { 1.0 }).collect();
         let mut lit_importance = 0.0f64;
-        for (&vote, &receiver) in self.vote.iter().zip(&self.receiver) {
-            lit_importance += if vote < 0.0 { f64::from(importance[receiver as usize]) } else { 0.0 };
+        for rows in self.lights.iter().skip(first).step_by(stride) {
+            for i in (rows.start..rows.end).filter(|i| keep(*i)) {
+                lit_importance +=
+                    if self.vote[i] < 0.0 { f64::from(importance[self.receiver[i] as usize]) } else { 0.0 };
+                blocked += usize::from(self.vote[i] > 0.0);
+            }
         }
-        let wanted = size.pairs as f64 * stride as f64 / 3.0;
+        let wanted = size.pairs as f64 / 3.0;
         let keep_blocked = (wanted / blocked.max(1) as f64).min(1.0);
         let lit_scale = 2.0 * wanted / lit_importance.max(f64::MIN_POSITIVE);
         // Error diffusion: every 1/p-th pair.
@@ -214,12 +225,12 @@ impl PairTable {
         self.picked((first, stride), |i| {
             let is_lit = self.vote[i] <= 0.0;
             let importance = f64::from(importance[self.receiver[i] as usize]);
-            let keep = if is_lit { (lit_scale * importance).min(1.0) } else { keep_blocked };
+            let share = if is_lit { (lit_scale * importance).min(1.0) } else { keep_blocked };
             let due = &mut due[usize::from(is_lit)];
-            *due += keep;
+            *due += if keep(i) { share } else { 0.0 };
             (*due >= 1.0).then(|| {
                 *due -= 1.0;
-                self.vote[i] * (stride as f64 / keep) as f32
+                self.vote[i] * (stride as f64 / share) as f32
             })
         })
     }
@@ -232,11 +243,14 @@ impl PairTable {
         out.resize(self.len(), 0);
         let casting = CastingPlane::new(&placed.plane, placed.side);
         for rows in &self.lights {
-            self.crossings_of_light(rows, (&casting, placed.bias), (width, height), &mut out[rows.start..rows.end]);
+            let out = &mut out[rows.start..rows.end];
+            if !self.crossings_of_light(rows, (&casting, placed.bias), (width, height), out) {
+                out.fill((width * height) as u16);
+            }
         }
     }
 
-    /// The same for the pairs of one light.
+    /// The same for the pairs of one light. False: none crosses, and `out` is as it was.
     ///
     /// # Panics
     /// As above.
@@ -246,12 +260,9 @@ impl PairTable {
         (casting, bias): (&CastingPlane, f32),
         (width, height): (usize, usize),
         out: &mut [u16],
-    ) {
+    ) -> bool {
         assert!(width * height <= MAX_TEXELS, "{width} x {height} texels");
-        let Some(rows) = casting.rows(light.light) else {
-            out.fill((width * height) as u16);
-            return;
-        };
+        let Some(rows) = casting.rows(light.light).filter(|rows| self.may_cross(rows, bias)) else { return false };
         let range = light.start..light.end;
         let ((x, _), (y, _), (z, _)) =
             (self.x[range.clone()].as_chunks(), self.y[range.clone()].as_chunks(), self.z[range].as_chunks());
@@ -265,6 +276,19 @@ impl PairTable {
                 }
             },
         );
+        true
+    }
+
+    /// Could a receiver in the table's box cross the rectangle? A light that shines past it is done with at once.
+    fn may_cross(&self, rows: &PlaneRows, bias: f32) -> bool {
+        let [low, high] = self.bounds;
+        let (centre, half) = (((low + high) * 0.5).extend(1.0), (high - low).extend(0.0) * 0.5);
+        let range = |row: Vec4| {
+            let (middle, reach) = (row.dot(centre), row.abs().dot(half) + BOUND_ERROR * (row.abs().dot(centre.abs())));
+            (middle - reach, middle + reach)
+        };
+        let [a, b, s] = [rows.a, rows.b, rows.s].map(range);
+        s.1 > bias && a.1 >= 0.0 && a.0 < 1.0 && b.1 >= 0.0 && b.0 < 1.0
     }
 }
 

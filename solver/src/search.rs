@@ -26,7 +26,7 @@ use crate::{
     sampling::hash,
     shade::CastingPlane,
     smoothing::smoothed,
-    window::{Scratch, window_votes, windowed},
+    window::Window,
 };
 use rayon::prelude::*;
 
@@ -159,8 +159,8 @@ impl<'a> Search<'a> {
         let mut planes = Vec::new();
         let mut covered = vec![false; self.table.len()];
         while planes.len() < self.options.max_planes.min(usize::from(u8::MAX)) {
-            let open = self.table.filtered(|i| !covered[i]);
             let seed = hash(self.options.seed, planes.len() as u64);
+            let open = self.table.sample_where(self.options.scoring, seed, |i| !covered[i]);
             let Some((found, cast)) = self.best_plane(&open, seed, None) else { break };
             if found.gain < min_gain {
                 break;
@@ -176,15 +176,15 @@ impl<'a> Search<'a> {
 
     /// Takes each plane out and puts the best one found back; returns the number of exchanges.
     fn replace_round(&self, planes: &mut [Found], round: usize) -> usize {
-        let mut scratch = Scratch::default();
+        let mut window = Window::default();
         let mut exchanges = 0;
         let mut covers = self.covers(planes);
         let mut counts = self.counts(&covers);
         for k in 0..planes.len() {
-            let open = self.table.filtered(|i| counts[i] == u8::from(covers[k][i]));
             let seed = hash(self.options.seed ^ 0x5EED, (round * planes.len() + k) as u64);
-            let scoring = open.sample(self.options.scoring, seed);
-            let kept = Found { gain: self.gain(&scoring, &planes[k].placed, &mut scratch), ..planes[k] };
+            let is_open = |i: usize| counts[i] == u8::from(covers[k][i]);
+            let open = self.table.sample_where(self.options.scoring, seed, is_open);
+            let kept = Found { gain: self.gain(&open, &planes[k].placed, &mut window), ..planes[k] };
             let found = self.best_plane(&open, seed, Some(&planes[k]));
             if let Some((found, cast)) = found.filter(|(found, _)| found.gain > kept.gain * (1.0 + REPLACE_MARGIN)) {
                 exchanges += 1;
@@ -230,8 +230,9 @@ impl<'a> Search<'a> {
         let covers = self.covers(planes);
         let counts = self.counts(&covers);
         let gain = |k: usize| {
-            let open = self.table.filtered(|i| counts[i] == u8::from(covers[k][i]));
-            self.gain(&open.sample(self.options.scoring, self.options.seed), &planes[k].placed, &mut Scratch::default())
+            let is_open = |i: usize| counts[i] == u8::from(covers[k][i]);
+            let open = self.table.sample_where(self.options.scoring, self.options.seed, is_open);
+            self.gain(&open, &planes[k].placed, &mut Window::default())
         };
         (0..planes.len()).into_par_iter().map(gain).collect()
     }
@@ -247,58 +248,55 @@ impl<'a> Search<'a> {
 
     /// Which pairs each plane covers, in the order of the planes: each decided by what those before leave open.
     fn covers(&self, planes: &[Found]) -> Vec<Vec<bool>> {
-        let mut scratch = Scratch::default();
+        let mut window = Window::default();
         let mut any = vec![false; self.table.len()];
         let cover = |found: &Found| {
-            let open = self.table.filtered(|i| !any[i]).sample(self.options.scoring, self.options.seed);
-            let cover = self.covered_by(&found.placed, &self.cast(&open, &found.placed, &mut scratch));
+            let open = self.table.sample_where(self.options.scoring, self.options.seed, |i| !any[i]);
+            let cover = self.covered_by(&found.placed, &self.cast(&open, &found.placed, &mut window));
             any.iter_mut().zip(&cover).for_each(|(a, b)| *a |= b);
             cover
         };
         planes.iter().map(cover).collect()
     }
 
-    /// The best plane for pairs that nothing covers; `start` is one more to improve.
-    fn best_plane(&self, open: &PairTable, seed: u64, start: Option<&Found>) -> Option<(Found, Cast)> {
+    /// The best plane for a sample of pairs that nothing covers; `start` is one more to improve.
+    fn best_plane(&self, scoring: &PairTable, seed: u64, start: Option<&Found>) -> Option<(Found, Cast)> {
         let o = self.options;
-        let scoring = &open.sample(o.scoring, seed);
         let screening = &scoring.sample(o.screening, hash(seed, 1));
         let wide: Vec<ShadowPlane> = propose(&self.place, scoring, o.proposals, seed);
-        let screened = measured(wide, |plane, scratch| {
-            Some((windowed(screening, &placed_anew(*plane), o.screening_texels, scratch), *plane))
+        let screened = measured(wide, |plane, window| {
+            Some((window.measure(screening, &placed_anew(*plane), o.screening_texels), *plane))
         });
         let finalists: Vec<ShadowPlane> = screened.into_iter().take(o.finalists).map(|(_, plane)| plane).collect();
-        let mut tight = measured(finalists, |plane, scratch| {
-            let plane = self.tight(scoring, &placed_anew(*plane), ROOM[0], scratch)?;
-            Some((windowed(scoring, &placed_anew(plane), o.texels, scratch), plane))
+        let mut tight = measured(finalists, |plane, window| {
+            let plane = self.tight(scoring, &placed_anew(*plane), ROOM[0], window)?;
+            Some((window.measure(scoring, &placed_anew(plane), o.texels), plane))
         });
         tight.truncate(o.refined);
         let starts: Vec<Found> =
             tight.iter().map(|(gain, plane)| Found { placed: placed_anew(*plane), gain: *gain }).collect();
         let starts: Vec<Found> = starts.into_iter().chain(start.copied()).collect();
-        let refined: Vec<Found> = starts
-            .par_iter()
-            .map_init(Scratch::default, |scratch, found| self.refine(scoring, *found, scratch))
-            .collect();
+        let refined: Vec<Found> =
+            starts.par_iter().map_init(Window::default, |window, found| self.refine(scoring, *found, window)).collect();
         let best = refined.into_iter().reduce(|a, b| if b.gain > a.gain { b } else { a })?;
-        let cast = self.cast(scoring, &best.placed, &mut Scratch::default());
+        let cast = self.cast(scoring, &best.placed, &mut Window::default());
         Some((best, cast))
     }
 
-    fn gain(&self, pairs: &PairTable, placed: &PlacedPlane, scratch: &mut Scratch) -> f64 {
-        windowed(pairs, placed, self.options.texels, scratch)
+    fn gain(&self, pairs: &PairTable, placed: &PlacedPlane, window: &mut Window) -> f64 {
+        window.measure(pairs, placed, self.options.texels)
     }
 
     /// Compass search (a step each way in both tilts and the offset; what gains is kept, else the step is halved), then
     /// a tight rectangle, then the bias.
-    fn refine(&self, pairs: &PairTable, start: Found, scratch: &mut Scratch) -> Found {
-        let mut at = Found { gain: self.gain(pairs, &start.placed, scratch), ..start };
+    fn refine(&self, pairs: &PairTable, start: Found, window: &mut Window) -> Found {
+        let mut at = Found { gain: self.gain(pairs, &start.placed, window), ..start };
         let mut tilt = FIRST_TILT;
         for _ in 0..self.options.refine_steps {
             for direction in 0..3 {
                 for step in [tilt, -tilt] {
                     let moved = PlacedPlane { plane: shifted(&at.placed.plane, direction, step), ..at.placed };
-                    let gain = self.gain(pairs, &moved, scratch);
+                    let gain = self.gain(pairs, &moved, window);
                     if gain > at.gain {
                         at = Found { placed: moved, gain };
                         break;
@@ -307,27 +305,27 @@ impl<'a> Search<'a> {
             }
             tilt *= 0.5;
         }
-        self.settled(pairs, at, scratch)
+        self.settled(pairs, at, window)
     }
 
     /// The plane with a tight rectangle, where that gains, and the bias that gains most.
-    fn settled(&self, pairs: &PairTable, mut at: Found, scratch: &mut Scratch) -> Found {
-        if let Some(plane) = self.tight(pairs, &at.placed, ROOM[1], scratch) {
+    fn settled(&self, pairs: &PairTable, mut at: Found, window: &mut Window) -> Found {
+        if let Some(plane) = self.tight(pairs, &at.placed, ROOM[1], window) {
             let tight = PlacedPlane { plane, ..at.placed };
-            let gain = self.gain(pairs, &tight, scratch);
+            let gain = self.gain(pairs, &tight, window);
             if gain > at.gain * TIGHTER_IS_WORTH {
                 at = Found { placed: tight, gain };
             }
         }
-        self.with_bias(pairs, at, scratch)
+        self.with_bias(pairs, at, window)
     }
 
     /// The plane with the bias that gains most.
-    fn with_bias(&self, pairs: &PairTable, start: Found, scratch: &mut Scratch) -> Found {
+    fn with_bias(&self, pairs: &PairTable, start: Found, window: &mut Window) -> Found {
         let mut best = start;
         for bias in BIASES {
             let placed = PlacedPlane { bias, ..start.placed };
-            let gain = self.gain(pairs, &placed, scratch);
+            let gain = self.gain(pairs, &placed, window);
             if gain > best.gain {
                 best = Found { placed, gain };
             }
@@ -336,20 +334,20 @@ impl<'a> Search<'a> {
     }
 
     /// The texture that all pairs of the plane's window decide, and the window.
-    fn cast(&self, pairs: &PairTable, placed: &PlacedPlane, scratch: &mut Scratch) -> Cast {
+    fn cast(&self, pairs: &PairTable, placed: &PlacedPlane, window: &mut Window) -> Cast {
         let n = self.options.texels;
-        self.gain(pairs, placed, scratch);
-        let votes = window_votes(pairs, n, scratch);
+        self.gain(pairs, placed, window);
+        let votes = window.all_votes();
         let mut blocked: Vec<u8> = smoothed(&votes, n).into_iter().map(|vote| u8::from(vote > 0.0)).collect();
         blocked.resize(n * n + SPARE, 0);
-        Cast { blocked, window: scratch.gains.iter().map(|gain| *gain > 0.0).collect() }
+        Cast { blocked, window: window.directions() }
     }
 
     /// The rectangle in the same plane, tight around what blocks in its window.
-    fn tight(&self, pairs: &PairTable, placed: &PlacedPlane, room: f32, scratch: &mut Scratch) -> Option<ShadowPlane> {
+    fn tight(&self, pairs: &PairTable, placed: &PlacedPlane, room: f32, window: &mut Window) -> Option<ShadowPlane> {
         let n = self.options.texels;
-        self.gain(pairs, placed, scratch);
-        let votes = window_votes(pairs, n, scratch);
+        self.gain(pairs, placed, window);
+        let votes = window.all_votes();
         let mut blocking = smoothed(&votes, n);
         blocking.iter_mut().zip(&votes).for_each(|(s, v)| *s = if *s > 0.0 { v.max(0.0) } else { 0.0 });
         Some(enlarged(&tight_around(&placed.plane, &blocking, n)?, room))
@@ -362,11 +360,11 @@ impl<'a> Search<'a> {
         let of_light = |rows: &LightRows| {
             let mut texels = vec![0u16; rows.end - rows.start];
             if cast.window[rows.direction] {
-                self.table.crossings_of_light(rows, (&casting, placed.bias), (n, n), &mut texels);
-                texels.iter().map(|&texel| cast.blocked[texel as usize] != 0).collect()
-            } else {
-                vec![false; texels.len()]
+                if self.table.crossings_of_light(rows, (&casting, placed.bias), (n, n), &mut texels) {
+                    return texels.iter().map(|&texel| cast.blocked[usize::from(texel)] != 0).collect();
+                }
             }
+            vec![false; texels.len()]
         };
         let parts: Vec<Vec<bool>> = self.table.lights.par_iter().map(of_light).collect();
         parts.concat()
@@ -378,11 +376,11 @@ impl<'a> Search<'a> {
 pub fn place(mesh: &Mesh, table: &PairTable, planes: &[(ShadowPlane, Side)], options: &SearchOptions) -> Vec<Found> {
     let search = Search::new(mesh, table, options);
     let sample = table.sample(options.scoring, options.seed);
-    let place = |scratch: &mut Scratch, &(plane, side): &(ShadowPlane, Side)| {
+    let place = |window: &mut Window, &(plane, side): &(ShadowPlane, Side)| {
         let placed = PlacedPlane { plane, side, bias: BIAS };
-        search.with_bias(&sample, Found { placed, gain: 0.0 }, scratch)
+        search.with_bias(&sample, Found { placed, gain: 0.0 }, window)
     };
-    planes.par_iter().map_init(Scratch::default, place).collect()
+    planes.par_iter().map_init(Window::default, place).collect()
 }
 
 /// Planes that another method placed, in its order: rectangles are made tight around what they block, and biases are
@@ -391,12 +389,12 @@ pub fn place(mesh: &Mesh, table: &PairTable, planes: &[(ShadowPlane, Side)], opt
 pub fn place_loosely(mesh: &Mesh, table: &PairTable, planes: &[ShadowPlane], options: &SearchOptions) -> Vec<Found> {
     let search = Search::new(mesh, table, options);
     let sample = table.sample(options.scoring, options.seed);
-    let place = |scratch: &mut Scratch, plane: &ShadowPlane| {
+    let place = |window: &mut Window, plane: &ShadowPlane| {
         let placed = placed_anew(*plane);
-        let gain = search.gain(&sample, &placed, scratch);
-        search.settled(&sample, Found { placed, gain }, scratch)
+        let gain = search.gain(&sample, &placed, window);
+        search.settled(&sample, Found { placed, gain }, window)
     };
-    planes.par_iter().map_init(Scratch::default, place).collect()
+    planes.par_iter().map_init(Window::default, place).collect()
 }
 
 /// A plane as a search starts with it.
@@ -412,10 +410,10 @@ fn least(gains: &[f64]) -> Option<(usize, f64)> {
 /// Measures planes in parallel; the best first, the earlier one of equals.
 fn measured(
     planes: Vec<ShadowPlane>,
-    measure: impl Fn(&ShadowPlane, &mut Scratch) -> Option<(f64, ShadowPlane)> + Sync,
+    measure: impl Fn(&ShadowPlane, &mut Window) -> Option<(f64, ShadowPlane)> + Sync,
 ) -> Vec<(f64, ShadowPlane)> {
     let mut scored: Vec<(f64, ShadowPlane)> =
-        planes.par_iter().map_init(Scratch::default, |scratch, plane| measure(plane, scratch)).flatten().collect();
+        planes.par_iter().map_init(Window::default, |window, plane| measure(plane, window)).flatten().collect();
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     scored
 }

@@ -9,68 +9,128 @@
 use crate::{
     pair_table::{PairTable, SPARE},
     plane::PlacedPlane,
+    shade::CastingPlane,
     smoothing::smoothed,
 };
 
 /// Rounds of deciding the texture and the window in turn.
 const WINDOW_ROUNDS: usize = 2;
 
-/// Memory for one measurement, kept from one to the next.
+/// One measurement, and memory for the next: pairs that cross the rectangle, the window and its votes.
 #[derive(Default)]
-pub(crate) struct Scratch {
-    /// Texel of each pair.
-    pub(crate) texels: Vec<u16>,
+pub(crate) struct Window {
+    /// Texels a side.
+    n: usize,
+    /// Texel of each pair that crosses the rectangle, grouped by light.
+    texels: Vec<u16>,
+    /// Their votes.
+    pair_votes: Vec<f32>,
+    /// Lights with such pairs.
+    lights: Vec<CrossedLight>,
+    /// Texels of one light's pairs before those that cross nothing are left out.
+    of_light: Vec<u16>,
     /// Votes per texel, the folds one after the other.
-    pub(crate) votes: Vec<f32>,
+    votes: Vec<f32>,
     /// 1 where a texture decided by a fold blocks.
-    pub(crate) blocked: Vec<f32>,
+    blocked: Vec<f32>,
     /// Gain per direction; the window is where it is positive.
-    pub(crate) gains: Vec<f32>,
+    gains: Vec<f32>,
 }
 
-/// Drop of the weighted error by a plane with a texture of `n` x `n` that is read only where it gains, counted under
-/// lights that did not decide the texture. Leaves texels and gains per direction in `scratch`.
-pub(crate) fn windowed(pairs: &PairTable, placed: &PlacedPlane, n: usize, scratch: &mut Scratch) -> f64 {
-    pairs.crossings(placed, (n, n), &mut scratch.texels);
-    let count = n * n + SPARE;
-    let Scratch { texels, votes, blocked, gains } = scratch;
-    gains.clear();
-    gains.resize(pairs.directions, 1.0);
-    for _ in 0..WINDOW_ROUNDS {
+/// A light under which pairs cross the rectangle, and where they are.
+struct CrossedLight {
+    direction: usize,
+    fold: usize,
+    start: usize,
+    end: usize,
+}
+
+impl Window {
+    /// Drop of the weighted error by a plane with a texture of `n` x `n` that is read only where it gains, counted
+    /// under lights that did not decide the texture.
+    pub(crate) fn measure(&mut self, pairs: &PairTable, placed: &PlacedPlane, n: usize) -> f64 {
+        self.n = n;
+        self.cross(pairs, placed);
+        self.gains.clear();
+        self.gains.resize(pairs.directions, 1.0);
+        for _ in 0..WINDOW_ROUNDS {
+            self.decide_textures();
+            self.count_gains();
+        }
+        self.gains.iter().map(|gain| f64::from(gain.max(0.0))).sum()
+    }
+
+    /// Under which directions the plane just measured is read.
+    pub(crate) fn directions(&self) -> Vec<bool> {
+        self.gains.iter().map(|gain| *gain > 0.0).collect()
+    }
+
+    /// Votes per texel of all pairs in the window of the plane just measured.
+    pub(crate) fn all_votes(&self) -> Vec<f32> {
+        let mut votes = vec![0.0f32; self.n * self.n];
+        for light in self.lights.iter().filter(|light| self.gains[light.direction] > 0.0) {
+            let range = light.start..light.end;
+            for (&texel, &vote) in self.texels[range.clone()].iter().zip(&self.pair_votes[range]) {
+                votes[usize::from(texel)] += vote;
+            }
+        }
+        votes
+    }
+
+    /// Finds the pairs that cross the rectangle; the others, most of them, are not looked at again.
+    fn cross(&mut self, pairs: &PairTable, placed: &PlacedPlane) {
+        let Self { n, texels, pair_votes, lights, of_light, .. } = self;
+        let (outside, mut count) = (*n * *n, 0);
+        lights.clear();
+        // Every entry up to `count` is written before it is read.
+        texels.resize(pairs.len(), 0);
+        pair_votes.resize(pairs.len(), 0.0);
+        let casting = CastingPlane::new(&placed.plane, placed.side);
+        for rows in &pairs.lights {
+            let start = count;
+            of_light.resize(rows.end - rows.start, 0);
+            if !pairs.crossings_of_light(rows, (&casting, placed.bias), (*n, *n), of_light) {
+                continue;
+            }
+            for (&texel, &vote) in of_light.iter().zip(&pairs.vote[rows.start..rows.end]) {
+                (texels[count], pair_votes[count]) = (texel, vote);
+                count += usize::from(usize::from(texel) < outside);
+            }
+            if count > start {
+                lights.push(CrossedLight { direction: rows.direction, fold: rows.fold, start, end: count });
+            }
+        }
+    }
+
+    /// The textures that each fold's lights in the window decide.
+    fn decide_textures(&mut self) {
+        let Self { n, texels, pair_votes, lights, votes, blocked, gains, .. } = self;
+        let count = *n * *n;
         votes.clear();
         votes.resize(2 * count, 0.0);
-        for rows in pairs.lights.iter().filter(|rows| gains[rows.direction] > 0.0) {
-            let votes = &mut votes[rows.fold * count..][..count];
-            for (&texel, &vote) in texels[rows.start..rows.end].iter().zip(&pairs.vote[rows.start..rows.end]) {
-                votes[texel as usize] += vote;
+        for light in lights.iter().filter(|light| gains[light.direction] > 0.0) {
+            let votes = &mut votes[light.fold * count..][..count];
+            let range = light.start..light.end;
+            for (&texel, &vote) in texels[range.clone()].iter().zip(&pair_votes[range]) {
+                votes[usize::from(texel)] += vote;
             }
         }
         blocked.clear();
-        blocked.resize(2 * count, 0.0);
-        for fold in 0..2 {
-            let smooth = smoothed(&votes[fold * count..][..n * n], n);
-            for (blocked, vote) in blocked[fold * count..].iter_mut().zip(smooth) {
-                *blocked = f32::from(u8::from(vote > 0.0));
-            }
-        }
-        gains.fill(0.0);
-        for rows in &pairs.lights {
-            let blocked = &blocked[(1 - rows.fold) * count..][..count];
-            let pairs = texels[rows.start..rows.end].iter().zip(&pairs.vote[rows.start..rows.end]);
-            gains[rows.direction] += pairs.map(|(&texel, vote)| vote * blocked[texel as usize]).sum::<f32>();
+        for votes in votes.chunks_exact(count) {
+            blocked.extend(smoothed(votes, *n).into_iter().map(|vote| f32::from(u8::from(vote > 0.0))));
         }
     }
-    gains.iter().map(|gain| f64::from(gain.max(0.0))).sum()
-}
 
-/// Votes per texel of all pairs in the window that [`windowed`] left in `scratch`.
-pub(crate) fn window_votes(pairs: &PairTable, n: usize, scratch: &Scratch) -> Vec<f32> {
-    let mut votes = vec![0.0f32; n * n + SPARE];
-    for rows in pairs.lights.iter().filter(|rows| scratch.gains[rows.direction] > 0.0) {
-        for (&texel, &vote) in scratch.texels[rows.start..rows.end].iter().zip(&pairs.vote[rows.start..rows.end]) {
-            votes[texel as usize] += vote;
+    /// What the textures gain per direction under the other fold's lights.
+    fn count_gains(&mut self) {
+        let Self { n, texels, pair_votes, lights, blocked, gains, .. } = self;
+        let count = *n * *n;
+        gains.fill(0.0);
+        for light in lights {
+            let blocked = &blocked[(1 - light.fold) * count..][..count];
+            let range = light.start..light.end;
+            let pairs = texels[range.clone()].iter().zip(&pair_votes[range]);
+            gains[light.direction] += pairs.map(|(&texel, vote)| vote * blocked[usize::from(texel)]).sum::<f32>();
         }
     }
-    votes.truncate(n * n);
-    votes
 }
