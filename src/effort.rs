@@ -55,7 +55,7 @@ impl Effort {
                     finalists: 12,
                     refined: 2,
                     scoring: SampleSize { lights: 128, pairs: 60_000 },
-                    texels: 64,
+                    texels: 40,
                     refine_steps: 4,
                     replace_rounds: 0,
                     ..whole.search
@@ -92,7 +92,7 @@ impl Effort {
                 finalists: 24,
                 refined: 3,
                 scoring: SampleSize { lights: 256, pairs: 150_000 },
-                texels: 96,
+                texels: 64,
                 refine_steps: 5,
                 replace_rounds: 1,
                 seed: 0,
@@ -146,6 +146,7 @@ impl Effort {
                     finalists: 48,
                     refined: 6,
                     scoring: SampleSize { lights: 512, pairs: 400_000 },
+                    texels: 96,
                     replace_rounds: 2,
                     ..whole.search
                 },

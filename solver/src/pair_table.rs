@@ -13,6 +13,7 @@ use crate::{
 };
 use glam::{Vec3, Vec4};
 use pulp::Arch;
+use rayon::prelude::*;
 
 /// The rows of one light in a [`PairTable`].
 #[derive(Clone, Copy, Debug)]
@@ -78,6 +79,9 @@ const BOUND_ERROR: f32 = 1e-6;
 
 /// Most texels of a grid: an index and its spare must fit 16 bits.
 pub const MAX_TEXELS: usize = (1 << 16) - SPARE;
+
+/// Lights per unit of parallel work. Fixed, so that sums are added in the same order at any thread count.
+const LIGHTS_PER_TASK: usize = 256;
 
 /// Lit pairs of a receiver are drawn in proportion to the share of its light that is blocked, plus this. Smaller makes
 /// false shadows on receivers that are never shadowed noisy; larger wastes the sample on them.
@@ -197,18 +201,12 @@ impl PairTable {
 
     /// The same of the pairs for which `keep(pair)`. Only the lights of the sample are read.
     #[must_use]
-    pub fn sample_where(&self, size: SampleSize, seed: u64, keep: impl Fn(usize) -> bool) -> Self {
+    pub fn sample_where(&self, size: SampleSize, seed: u64, keep: impl Fn(usize) -> bool + Sync) -> Self {
         // An odd stride keeps both folds.
         let stride = (self.lights.len() / size.lights.max(1)).max(1) | 1;
         let first = (uniform(seed, 2) * stride as f64) as usize;
-        let mut shares = vec![[0.0f32; 2]; self.receivers];
+        let importance = self.importance(&keep);
         let mut blocked = 0usize;
-        for i in (0..self.len()).filter(|i| keep(*i)) {
-            let share = &mut shares[self.receiver[i] as usize];
-            share[0] += self.vote[i].max(0.0);
-            share[1] += self.vote[i].abs();
-        }
-        let importance: Vec<f32> = shares.iter().map(|[b, t]| if *t > 0.0 { b / t + LIT_FLOOR } else { 1.0 }).collect();
         let mut lit_importance = 0.0f64;
         for rows in self.lights.iter().skip(first).step_by(stride) {
             for i in (rows.start..rows.end).filter(|i| keep(*i)) {
@@ -233,6 +231,27 @@ impl PairTable {
                 self.vote[i] * (stride as f64 / share) as f32
             })
         })
+    }
+
+    /// How much lit pairs of each receiver matter: the share of its light that is blocked, of the pairs for which
+    /// `keep(pair)`, and a little. From all lights: those of a sample alone, or all pairs whether kept or not, took the
+    /// held-out error of 11 planes on teapot_three from 0.135 to 0.140 and 0.148 (mean of four and six seeds).
+    fn importance(&self, keep: &(impl Fn(usize) -> bool + Sync)) -> Vec<f32> {
+        let of_lights = |lights: &[LightRows]| {
+            let mut weights = vec![[0.0f32; 2]; self.receivers];
+            for i in lights.iter().flat_map(|rows| rows.start..rows.end).filter(|i| keep(*i)) {
+                let [blocked, all] = &mut weights[self.receiver[i] as usize];
+                *blocked += self.vote[i].max(0.0);
+                *all += self.vote[i].abs();
+            }
+            weights
+        };
+        let partials: Vec<Vec<[f32; 2]>> = self.lights.par_chunks(LIGHTS_PER_TASK).map(of_lights).collect();
+        let sum = |receiver: usize| {
+            partials.iter().map(|weights| weights[receiver]).fold([0.0f32; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
+        };
+        let importance = |[blocked, all]: [f32; 2]| if all > 0.0 { blocked / all + LIT_FLOOR } else { 1.0 };
+        (0..self.receivers).map(|receiver| importance(sum(receiver))).collect()
     }
 
     /// The texel of each pair's crossing on a grid of `width` x `height` over a plane; `width * height` and up: none.
