@@ -4,19 +4,19 @@
 //! light) is to be drawn; a pair's vote is divided by it, so that all sums stay what they are on average. Method:
 //! stratified sampling (Neyman, "On the Two Different Aspects of the Representative Method", 1934) in two phases.
 //! Strata are groups of near receivers under the lights of one direction. A pilot of few rays estimates the share p of
-//! each that is blocked, together with the strata beside it, and rates go with sqrt(p(1-p)): where a pilot is all lit or
-//! all in shadow few pairs tell the rest. Pilot rays decide rates and nothing else: kept as pairs they would bias the
-//! sums towards what made them stop.
+//! each that is blocked, together with the strata beside it, and rates go with sqrt(p(1-p)): where a pilot is all lit
+//! or all in shadow few pairs tell the rest. Pilot rays decide rates and nothing else: kept as pairs they would bias
+//! the sums towards what made them stop.
 //!
 //! Not guaranteed: that a shadow smaller than a stratum is seen by the pilot. One of n candidates is then still drawn
 //! at the least rate r, and missed with probability (1-r)^n; r is [`FLOOR`] of the largest rate.
 //!
 //! Held-out error and user seconds of the whole fit, 14 million pairs, 96 sections, seed 7, one run each: teapot_three
-//! uniform 0.0564, 52 s; so 0.0449, 55 s (an earlier draw of the same rates 0.0429: what follows differs by hardly more).
-//! j31_twintail 0.0966, 93 s; 0.0895, 106 s. Floors of 0.1 and 0.01: teapot_three 0.0474 and 0.0467; 8 million pairs from 16
-//! candidates each 0.0508, 48 s. Left out: rates in proportion to the weight of a pair too, so that votes are of one
-//! size (0.0531 instead of 0.0488; 4 candidates a pair, floor 0.1); lit pairs in the search's samples drawn evenly
-//! instead of by the shadow of their receivers (0.0476 instead of 0.0474; floor 0.1).
+//! uniform 0.0564, 52 s; so 0.0449, 55 s (an earlier draw of the same rates 0.0429: what follows differs by hardly
+//! more). j31_twintail 0.0966, 93 s; 0.0895, 106 s. Floors of 0.1 and 0.01: teapot_three 0.0474 and 0.0467; 8 million
+//! pairs from 16 candidates each 0.0508, 48 s. Left out: rates in proportion to the weight of a pair too, so that votes
+//! are of one size (0.0531 instead of 0.0488; 4 candidates a pair, floor 0.1); lit pairs in the search's samples drawn
+//! evenly instead of by the shadow of their receivers (0.0476 instead of 0.0474; floor 0.1).
 
 use crate::{
     mesh::Mesh,
