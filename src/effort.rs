@@ -111,7 +111,7 @@ impl Effort {
         };
         let divided = Plan {
             sections: 96,
-            trace: TraceOptions { pairs: 14_000_000, lights: 2048, stride: 4, exposure_rays: 16, seed: 0 },
+            trace: TraceOptions { pairs: 14_000_000, lights: 2048, stride: 8, exposure_rays: 16, seed: 0 },
             directions: 192,
             search: SearchOptions {
                 max_planes: 16,

@@ -16,7 +16,7 @@ use shadowfit_solver::{
     sampling::hash,
     search::{Found, SearchOptions, Verdict, search},
     sections::{self, TraceOptions},
-    visibility::{Pairs, trace, trace_sparse},
+    visibility::{Pairs, trace, trace_drawn},
 };
 
 /// How a case is fitted.
@@ -110,7 +110,10 @@ fn whole(mesh: &Mesh, count: usize, directions: &[Vec3], settings: &Settings) ->
     let lights = domain.directions(TRAINING.1, hash(settings.seed, 3));
     let receivers = receivers(mesh, count, hash(settings.seed, 4));
     let stride = (count * TRAINING.1 / 2 / TRAINING.0).max(1);
-    PairTable::new(&trace_sparse(mesh, &receivers, &lights, domain.solid_angle(), stride), directions)
+    PairTable::new(
+        &trace_drawn(mesh, &receivers, &lights, domain.solid_angle(), |_, _| 1.0 / stride as f32),
+        directions,
+    )
 }
 
 impl Fitted {

@@ -9,6 +9,7 @@ pub mod certificate;
 pub mod columns;
 pub mod field;
 pub mod fit;
+pub mod importance;
 pub mod lights;
 pub mod lists;
 pub mod mesh;

@@ -4,7 +4,7 @@
 //! where the light is blocked, negative where it is not. A texel of an occluder texture should block exactly where
 //! the votes of the pairs whose rays cross it sum to more than zero; everything later works on these four columns.
 
-use crate::{mesh::Mesh, receivers::Receivers, sampling::hash};
+use crate::{mesh::Mesh, receivers::Receivers, sampling::uniform};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -21,7 +21,7 @@ pub struct LightPairs {
     pub z: Vec<f32>,
     /// Index of the receiver.
     pub receiver: Vec<u32>,
-    /// `+w` where blocked, `-w` where lit; `w = area x exposure x n.l x solid angle`.
+    /// `+w` where blocked, `-w` where lit; `w = area x exposure x n.l x solid angle / rate`.
     pub vote: Vec<f32>,
 }
 
@@ -57,12 +57,6 @@ impl LightPairs {
         Vec3::new(self.x[i], self.y[i], self.z[i])
     }
 
-    fn with_capacity(light: Vec3, capacity: usize) -> Self {
-        let column = || Vec::with_capacity(capacity);
-        let receiver = Vec::with_capacity(capacity);
-        Self { light, x: column(), y: column(), z: column(), receiver, vote: column() }
-    }
-
     fn push(&mut self, p: Vec3, receiver: u32, vote: f32) {
         self.x.push(p.x);
         self.y.push(p.y);
@@ -89,16 +83,29 @@ impl Pairs {
 /// Traces one shadow ray for every receiver that faces a light; `solid_angle` is that of all lights together.
 #[must_use]
 pub fn trace(mesh: &Mesh, receivers: &Receivers, lights: &[Vec3], solid_angle: f64) -> Pairs {
-    trace_sparse(mesh, receivers, lights, solid_angle, 1)
+    trace_drawn(mesh, receivers, lights, solid_angle, |_, _| 1.0)
 }
 
-/// The same with one in `stride` receivers for each light, drawn anew for each. Drawn, not counted off: a lattice of
-/// receivers under a lattice of lights left some directions with the same corner of every triangle.
+/// The same for some of the pairs: `rate(light, receiver)`, above 0, is the probability that one is drawn, and its vote
+/// stands for the others. Drawn, not counted off: a lattice of receivers under a lattice of lights left some directions
+/// with the same corner of every triangle.
 #[must_use]
-pub fn trace_sparse(mesh: &Mesh, receivers: &Receivers, lights: &[Vec3], solid_angle: f64, stride: usize) -> Pairs {
-    let share = (solid_angle / lights.len().max(1) as f64) as f32 * stride as f32;
-    let lights: Vec<LightPairs> =
-        lights.par_iter().enumerate().map(|(k, &l)| trace_light(mesh, receivers, l, share, (stride, k))).collect();
+pub fn trace_drawn(
+    mesh: &Mesh,
+    receivers: &Receivers,
+    lights: &[Vec3],
+    solid_angle: f64,
+    rate: impl Fn(usize, usize) -> f32 + Sync,
+) -> Pairs {
+    let share = (solid_angle / lights.len().max(1) as f64) as f32;
+    let of_light = |(k, light): (usize, &Vec3)| {
+        let draw = |i: usize| {
+            let rate = rate(k, i).min(1.0);
+            (rate >= 1.0 || uniform(k as u64, i as u64) < f64::from(rate)).then_some(rate)
+        };
+        trace_light(mesh, receivers, (*light, share), draw)
+    };
+    let lights: Vec<LightPairs> = lights.par_iter().enumerate().map(of_light).collect();
     let (mut shadow_weight, mut total_weight) = (0.0, 0.0);
     for vote in lights.iter().flat_map(|l| &l.vote) {
         shadow_weight += f64::from(vote.max(0.0));
@@ -107,27 +114,24 @@ pub fn trace_sparse(mesh: &Mesh, receivers: &Receivers, lights: &[Vec3], solid_a
     Pairs { lights, shadow_weight, total_weight, receivers: receivers.points.len() }
 }
 
+/// Traces the pairs of one light for which `draw(receiver)` gives the rate at which they were drawn.
 fn trace_light(
     mesh: &Mesh,
     receivers: &Receivers,
-    light: Vec3,
-    solid_angle: f32,
-    (stride, index): (usize, usize),
+    (light, solid_angle): (Vec3, f32),
+    draw: impl Fn(usize) -> Option<f32>,
 ) -> LightPairs {
-    let mut pairs = LightPairs::with_capacity(light, receivers.points.len() / 2 / stride);
-    for fold in 0..2 {
-        for i in (fold..receivers.points.len()).step_by(2) {
-            if stride > 1 && !hash(index as u64, i as u64).is_multiple_of(stride as u64) {
-                continue;
-            }
-            let cosine = receivers.normals[i].dot(light);
-            if cosine <= 0.0 {
-                continue;
-            }
-            let weight = receivers.weights[i] * cosine * solid_angle;
-            let blocked = mesh.is_blocked(receivers.origins[i], light);
-            pairs.push(receivers.points[i], i as u32, if blocked { weight } else { -weight });
+    let (x, y, z, receiver, vote) = Default::default();
+    let mut pairs = LightPairs { light, x, y, z, receiver, vote };
+    for (i, normal) in receivers.normals.iter().enumerate() {
+        let cosine = normal.dot(light);
+        if cosine <= 0.0 {
+            continue;
         }
+        let Some(rate) = draw(i) else { continue };
+        let vote = receivers.weights[i] * cosine * solid_angle / rate;
+        let blocked = mesh.is_blocked(receivers.origins[i], light);
+        pairs.push(receivers.points[i], i as u32, if blocked { vote } else { -vote });
     }
     pairs
 }
