@@ -42,7 +42,7 @@ pub fn counters() -> Result<Vec<Counter>, Box<dyn Error>> {
     let mut out = Vec::new();
     for (what, table) in [("sample", &sample), ("table", &table(MANY_PAIRS))] {
         let rate = crossings(table, options.texels)?;
-        let name = format!("crossings, {what} of {} pairs", table.len());
+        let name = format!("crossings in a {what} of {} pairs", table.len());
         let read = limits::floats_read(&[&table.x, &table.y, &table.z], 4 * repeats(table))? / FLOATS;
         let computed = multiply_adds / MULTIPLY_ADDS;
         for (limit, of) in [(read, "summing the same floats"), (computed, "9 multiply-adds a pair")] {
@@ -53,7 +53,7 @@ pub fn counters() -> Result<Vec<Counter>, Box<dyn Error>> {
     let crossings = out[0].rate;
     let rate = measurements(&mesh, &section, &sample, &options)?;
     let limit = Some((crossings, "its crossings alone".to_string()));
-    let name = format!("measurement of a plane, sample of {} pairs", sample.len());
+    let name = format!("measurement of a plane on a sample of {} pairs", sample.len());
     out.push(Counter { name, rate, limit, agreeing: None });
     Ok(out)
 }

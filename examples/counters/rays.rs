@@ -26,7 +26,7 @@ pub fn counters(python: Option<&Path>) -> Result<Vec<Counter>, Box<dyn Error>> {
         let mesh = Mesh::new(&Model::with_triangles(triangles).to_soup())?;
         let receivers = sample(&mesh, &ReceiverOptions { count: RECEIVERS, exposure_rays: 4, seed: 1 });
         for (order, rays) in orders(&receivers) {
-            let name = format!("shadow rays {order}, {} triangles", mesh.triangle_count());
+            let name = format!("shadow rays {order} against {} triangles", mesh.triangle_count());
             let mut blocked = Vec::new();
             let seconds = best_seconds(PASSES, || {
                 blocked.clear();
@@ -37,7 +37,7 @@ pub fn counters(python: Option<&Path>) -> Result<Vec<Counter>, Box<dyn Error>> {
             if let Some(python) = python {
                 fs::write(&file, dump(&mesh, &rays, &blocked))?;
                 let (rate, share) = embree(python, &file)?;
-                (limit, agreeing) = (Some((rate, "Embree 4, robust".to_string())), Some(share));
+                (limit, agreeing) = (Some((rate, "robust Embree 4".to_string())), Some(share));
             }
             out.push(Counter { name, rate, limit, agreeing });
         }
