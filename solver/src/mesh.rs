@@ -9,6 +9,9 @@
 //! eight-wide BVH (obvhs). Guaranteed: a ray never slips through an edge or vertex that two triangles share.
 //! Not guaranteed: the side of a hit closer than [`BOX_PADDING`] to the ray's origin.
 
+mod traversal;
+mod watertight;
+
 use glam::{DVec3, Vec2, Vec3, Vec3A};
 use obvhs::{
     BvhBuildParams,
@@ -18,6 +21,8 @@ use obvhs::{
 };
 use serde::{Deserialize, Serialize};
 use std::{collections::HashSet, sync::Arc, time::Duration};
+use traversal::any_hit;
+use watertight::WatertightRay;
 
 /// Boxes grow by this much, in unit space. Below `2.4e-7` an axis-aligned ray on a box face is lost, since the
 /// traversal replaces 1/0 by 1/eps; above `1e-5` boxes of dense scans overlap and rays get slower.
@@ -243,7 +248,15 @@ impl Mesh {
     #[must_use]
     pub fn is_blocked(&self, origin: Vec3, direction: Vec3) -> bool {
         let watertight = WatertightRay::new(origin, direction);
-        !self.bvh.ray_traverse_miss(bvh_ray(origin, direction), |_, i| self.hit_distance(&watertight, i as u32))
+        any_hit(
+            &self.bvh,
+            &bvh_ray(origin, direction),
+            #[inline(always)]
+            |i| {
+                let hit = watertight.intersect(&self.corners[i as usize]);
+                hit.is_some_and(|(_, barycentric)| self.is_solid(i, barycentric))
+            },
+        )
     }
 
     /// The nearest surface from `origin` in direction `direction` (unit). `drawn` says whether a triangle counts
@@ -254,19 +267,17 @@ impl Mesh {
         let mut hit = RayHit::none();
         self.bvh.ray_traverse(bvh_ray(origin, direction), &mut hit, |_, i| {
             let from_front = self.normals[i].dot(direction) < 0.0;
-            if drawn(i as u32, from_front) { self.hit_distance(&watertight, i as u32) } else { f32::INFINITY }
+            if !drawn(i as u32, from_front) {
+                return f32::INFINITY;
+            }
+            match watertight.intersect(&self.corners[i]) {
+                Some((t, barycentric)) if self.is_solid(i as u32, barycentric) => t * BVH_SCALE,
+                _ => f32::INFINITY,
+            }
         });
         let triangle = hit.primitive_id;
         let (distance, barycentric) = watertight.intersect(self.corners.get(triangle as usize)?)?;
         Some(Hit { triangle, distance, barycentric })
-    }
-
-    /// Distance in BVH units to a solid point of triangle `i`, or infinity.
-    fn hit_distance(&self, ray: &WatertightRay, i: u32) -> f32 {
-        match ray.intersect(&self.corners[i as usize]) {
-            Some((t, barycentric)) if self.is_solid(i, barycentric) => t * BVH_SCALE,
-            _ => f32::INFINITY,
-        }
     }
 }
 
@@ -339,61 +350,4 @@ pub fn ray_origin(p: Vec3, normal: Vec3) -> Vec3 {
         _ => x,
     };
     Vec3::new(away(moved.x, offset.x), away(moved.y, offset.y), away(moved.z, offset.z))
-}
-
-/// A ray prepared for the watertight test: axes permuted so that the direction is largest in z, and sheared so
-/// that it runs along +z.
-struct WatertightRay {
-    origin: Vec3,
-    direction: Vec3,
-    axes: [usize; 3],
-    shear: Vec3,
-}
-
-impl WatertightRay {
-    fn new(origin: Vec3, direction: Vec3) -> Self {
-        let kz = direction.abs().max_position();
-        let (mut kx, mut ky) = ((kz + 1) % 3, (kz + 2) % 3);
-        if direction[kz] < 0.0 {
-            std::mem::swap(&mut kx, &mut ky);
-        }
-        let inv = 1.0 / direction[kz];
-        Self { origin, direction, axes: [kx, ky, kz], shear: Vec3::new(direction[kx] * inv, direction[ky] * inv, inv) }
-    }
-
-    /// Distance and corner weights where the ray meets the triangle in front of its origin; edges count as hits.
-    fn intersect(&self, corners: &[Vec3; 3]) -> Option<(f32, Vec3)> {
-        let [kx, ky, kz] = self.axes;
-        // Shear the corners, relative to the origin, so that the ray becomes the z axis.
-        let sheared = corners.map(|corner| {
-            let p = corner - self.origin;
-            Vec3::new(p[kx] - self.shear.x * p[kz], p[ky] - self.shear.y * p[kz], self.shear.z * p[kz])
-        });
-        let [a, b, c] = sheared;
-        // Scaled weights: signed areas of the three sub-triangles; exact in f64 where f32 says zero.
-        let mut e = Vec3::new(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
-        if e.x == 0.0 || e.y == 0.0 || e.z == 0.0 {
-            let area = |p: Vec3, q: Vec3| (f64::from(p.x) * f64::from(q.y) - f64::from(p.y) * f64::from(q.x)) as f32;
-            e = Vec3::new(area(c, b), area(a, c), area(b, a));
-        }
-        if (e.x < 0.0 || e.y < 0.0 || e.z < 0.0) && (e.x > 0.0 || e.y > 0.0 || e.z > 0.0) {
-            return None;
-        }
-        let det = e.x + e.y + e.z;
-        if det == 0.0 {
-            return None;
-        }
-        let weights = e / det;
-        let t = self.distance(corners).unwrap_or_else(|| weights.dot(Vec3::new(a.z, b.z, c.z)));
-        (t > 0.0).then_some((t, weights))
-    }
-
-    /// Distance to the triangle's plane in f64, `None` where it is edge-on. Interpolating it with the f32 weights is
-    /// wrong by 1e-4 on slivers, enough to put a surface that the ray has just left in front of it.
-    fn distance(&self, corners: &[Vec3; 3]) -> Option<f32> {
-        let [a, b, c] = corners.map(|corner| corner.as_dvec3());
-        let normal = (b - a).cross(c - a);
-        let facing = self.direction.as_dvec3().dot(normal);
-        (facing != 0.0).then(|| ((a - self.origin.as_dvec3()).dot(normal) / facing) as f32)
-    }
 }
