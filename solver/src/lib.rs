@@ -7,6 +7,7 @@ pub mod baselines;
 pub mod budget;
 pub mod certificate;
 pub mod columns;
+pub mod crossing;
 pub mod field;
 pub mod fit;
 pub mod importance;

@@ -5,14 +5,8 @@
 //! as the search of whole models had them, hid most of the over-fitting: with 384 lights in 64 sections the held-out
 //! error was 0.058 on new receivers, 0.069 under new lights and 0.049 on the training pairs.
 
-use crate::{
-    plane::PlacedPlane,
-    sampling::uniform,
-    shade::{CastingPlane, PlaneRows},
-    visibility::Pairs,
-};
-use glam::{Vec3, Vec4};
-use pulp::Arch;
+use crate::{sampling::uniform, visibility::Pairs};
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// The rows of one light in a [`PairTable`].
@@ -45,6 +39,8 @@ pub struct PairTable {
     pub receiver: Vec<u32>,
     /// Rows by light, sorted by direction.
     pub lights: Vec<LightRows>,
+    /// The same lights: x, y and z of sixteen at a time; the last are filled up with zeros.
+    pub light_lanes: Vec<[[f32; LANES]; 3]>,
     /// Number of directions.
     pub directions: usize,
     /// Receivers that the pairs were made from.
@@ -68,14 +64,7 @@ pub const SPARE: usize = 16;
 
 /// The rows of a light are padded with pairs of no weight to a multiple of this, which the vector loop takes at once:
 /// a sample has some twenty pairs a light, and the odd ones at the end cost as much as all others.
-const LANES: usize = 16;
-
-/// 2^23: added to a float of 0..2^23 it leaves the integer part, rounded to nearest, in the low 23 bits. A plain `as`
-/// conversion saturates, which no vector instruction does.
-const TO_INTEGER: f32 = 8_388_608.0;
-
-/// What rounding may add to a bound, as a share of the terms it is summed from.
-const BOUND_ERROR: f32 = 1e-6;
+pub(crate) const LANES: usize = 16;
 
 /// Most texels of a grid: an index and its spare must fit 16 bits.
 pub const MAX_TEXELS: usize = (1 << 16) - SPARE;
@@ -106,7 +95,7 @@ impl PairTable {
             table.receiver.extend(&light.receiver);
             table.pad(start);
             let end = table.len();
-            table.lights.push(LightRows { light: light.light, direction, fold: position % 2, start, end });
+            table.push_light(LightRows { light: light.light, direction, fold: position % 2, start, end });
         }
         let points = || (0..table.len()).map(|i| table.point(i));
         table.bounds = [points().fold(Vec3::INFINITY, Vec3::min), points().fold(Vec3::NEG_INFINITY, Vec3::max)];
@@ -121,6 +110,17 @@ impl PairTable {
         }
         self.vote.extend(std::iter::repeat_n(0.0, count));
         self.receiver.extend(std::iter::repeat_n(self.receiver.last().copied().unwrap_or_default(), count));
+    }
+
+    fn push_light(&mut self, rows: LightRows) {
+        let lane = self.lights.len() % LANES;
+        if lane == 0 {
+            self.light_lanes.push([[0.0; LANES]; 3]);
+        }
+        if let Some(lanes) = self.light_lanes.last_mut() {
+            lanes.iter_mut().zip(rows.light.to_array()).for_each(|(column, x)| column[lane] = x);
+        }
+        self.lights.push(rows);
     }
 
     fn reserve(&mut self, pairs: usize, lights: usize) {
@@ -181,7 +181,7 @@ impl PairTable {
                 }
             }
             out.pad(start);
-            out.lights.push(LightRows { start, end: out.len(), ..*rows });
+            out.push_light(LightRows { start, end: out.len(), ..*rows });
         }
         out
     }
@@ -252,102 +252,6 @@ impl PairTable {
         };
         let importance = |[blocked, all]: [f32; 2]| if all > 0.0 { blocked / all + LIT_FLOOR } else { 1.0 };
         (0..self.receivers).map(|receiver| importance(sum(receiver))).collect()
-    }
-
-    /// The texel of each pair's crossing on a grid of `width` x `height` over a plane; `width * height` and up: none.
-    ///
-    /// # Panics
-    /// The grid has more than [`MAX_TEXELS`].
-    pub fn crossings(&self, placed: &PlacedPlane, (width, height): (usize, usize), out: &mut Vec<u16>) {
-        out.resize(self.len(), 0);
-        let casting = CastingPlane::new(&placed.plane, placed.side);
-        for rows in &self.lights {
-            let out = &mut out[rows.start..rows.end];
-            if !self.crossings_of_light(rows, (&casting, placed.bias), (width, height), out) {
-                out.fill((width * height) as u16);
-            }
-        }
-    }
-
-    /// The same for the pairs of one light. False: none crosses, and `out` is as it was.
-    ///
-    /// # Panics
-    /// As above.
-    pub fn crossings_of_light(
-        &self,
-        light: &LightRows,
-        (casting, bias): (&CastingPlane, f32),
-        (width, height): (usize, usize),
-        out: &mut [u16],
-    ) -> bool {
-        assert!(width * height <= MAX_TEXELS, "{width} x {height} texels");
-        let Some(rows) = casting.rows(light.light).filter(|rows| self.may_cross(rows, bias)) else { return false };
-        let range = light.start..light.end;
-        let ((x, _), (y, _), (z, _)) =
-            (self.x[range.clone()].as_chunks(), self.y[range.clone()].as_chunks(), self.z[range].as_chunks());
-        let (out, _) = out.as_chunks_mut();
-        let texel = Texel::new(&rows, bias, (width, height));
-        Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                for (((out, x), y), z) in out.iter_mut().zip(x).zip(y).zip(z) {
-                    *out = texel.of_lanes(x, y, z);
-                }
-            },
-        );
-        true
-    }
-
-    /// Could a receiver in the table's box cross the rectangle? A light that shines past it is done with at once.
-    fn may_cross(&self, rows: &PlaneRows, bias: f32) -> bool {
-        let [low, high] = self.bounds;
-        let (centre, half) = (((low + high) * 0.5).extend(1.0), (high - low).extend(0.0) * 0.5);
-        let range = |row: Vec4| {
-            let (middle, reach) = (row.dot(centre), row.abs().dot(half) + BOUND_ERROR * (row.abs().dot(centre.abs())));
-            (middle - reach, middle + reach)
-        };
-        let [a, b, s] = [rows.a, rows.b, rows.s].map(range);
-        s.1 > bias && a.1 >= 0.0 && a.0 < 1.0 && b.1 >= 0.0 && b.0 < 1.0
-    }
-}
-
-/// The map from receivers to texels under one light.
-struct Texel {
-    a: [f32; 4],
-    b: [f32; 4],
-    s: [f32; 4],
-    bias: f32,
-    width: f32,
-    height: f32,
-    outside: u32,
-}
-
-impl Texel {
-    fn new(rows: &PlaneRows, bias: f32, (width, height): (usize, usize)) -> Self {
-        let outside = (width * height) as u32;
-        let (width, height) = (width as f32, height as f32);
-        let [a, b, s] = [rows.a * width, rows.b * height, rows.s].map(|row| row.to_array());
-        Self { a, b, s, bias, width, height, outside }
-    }
-
-    #[inline(always)]
-    fn of_lanes(&self, x: &[f32; LANES], y: &[f32; LANES], z: &[f32; LANES]) -> [u16; LANES] {
-        let Self { a: ra, b: rb, s: rs, bias, width: w, height: h, outside } = *self;
-        let mut out = [0; LANES];
-        for i in 0..LANES {
-            let (x, y, z) = (x[i], y[i], z[i]);
-            let a = ra[0] * x + ra[1] * y + ra[2] * z + ra[3];
-            let b = rb[0] * x + rb[1] * y + rb[2] * z + rb[3];
-            let s = rs[0] * x + rs[1] * y + rs[2] * z + rs[3];
-            let inside = (s > bias) & (a >= 0.0) & (a < w) & (b >= 0.0) & (b < h);
-            // Column and row as whole floats, the index exact in them up to 2^23 texels.
-            let column = (a - 0.5).max(0.0) + TO_INTEGER - TO_INTEGER;
-            let row = (b - 0.5).max(0.0) + TO_INTEGER - TO_INTEGER;
-            let index = (row * w + column + TO_INTEGER).to_bits() & 0x007f_ffff;
-            let spare = outside + (i % SPARE) as u32;
-            out[i] = if inside { index } else { spare } as u16;
-        }
-        out
     }
 }
 

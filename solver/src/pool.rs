@@ -9,11 +9,12 @@
 //! Not guaranteed: that re-baking or the search end in the best textures or planes; `relaxation` bounds those.
 
 use crate::{
-    pair_table::{LightRows, PairTable, SPARE},
+    crossing::Casts,
+    pair_table::{PairTable, SPARE},
     plane::PlacedPlane,
-    shade::CastingPlane,
 };
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// A plane that may be chosen, with the grid of its binary texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,12 +95,16 @@ impl Instance {
             families[family].push(index);
             family_of.push(family);
         }
-        let block = |lights: &[LightRows]| {
-            let mut block = block((pairs, lights), pool, &numbered, &first_texel);
+        let casts: Vec<Casts> =
+            pool.iter().map(|plane| Casts::new(pairs, &plane.placed, (plane.width, plane.height))).collect();
+        let block = |first: usize| {
+            let lights = first..pairs.lights.len().min(first + LIGHTS_PER_BLOCK);
+            let mut block = block((pairs, lights), &casts, &numbered, &first_texel);
             block.share_lit(&families);
             block
         };
-        let blocks: Vec<Block> = pairs.lights.par_chunks(LIGHTS_PER_BLOCK).map(block).collect();
+        let firsts: Vec<usize> = (0..pairs.lights.len()).step_by(LIGHTS_PER_BLOCK).collect();
+        let blocks: Vec<Block> = firsts.into_par_iter().map(block).collect();
         let shadow_weight = blocks.iter().flat_map(|b| &b.blocked).map(|w| f64::from(*w)).sum();
         Self { blocks, first_texel, families, family_of, shadow_weight }
     }
@@ -215,21 +220,22 @@ fn contested(pairs: &PairTable, plane: &PoolPlane) -> (Vec<u32>, u32) {
 }
 
 fn block(
-    (pairs, lights): (&PairTable, &[LightRows]),
-    pool: &[PoolPlane],
+    (pairs, lights): (&PairTable, Range<usize>),
+    casts: &[Casts],
     numbered: &[(Vec<u32>, u32)],
     first: &[usize],
 ) -> Block {
-    let start = lights[0].start;
-    let votes = &pairs.vote[start..lights[lights.len() - 1].end];
-    let mut planes = Vec::with_capacity(pool.len());
+    let start = pairs.lights[lights.start].start;
+    let votes = &pairs.vote[start..pairs.lights[lights.end - 1].end];
+    let mut planes = Vec::with_capacity(casts.len());
     let mut crossed = vec![false; votes.len()];
     let mut texels = vec![0u16; votes.len()];
-    for ((plane, (numbers, _)), first) in pool.iter().zip(numbered).zip(first) {
-        let casting = CastingPlane::new(&plane.placed.plane, plane.placed.side);
-        for rows in lights {
-            let texels = &mut texels[rows.start - start..rows.end - start];
-            pairs.crossings_of_light(rows, (&casting, plane.placed.bias), (plane.width, plane.height), texels);
+    for ((casts, (numbers, _)), first) in casts.iter().zip(numbered).zip(first) {
+        // Where nothing crosses, the last number stands: that of what lies outside.
+        texels.fill((numbers.len() - 1) as u16);
+        for light in lights.clone() {
+            let rows = &pairs.lights[light];
+            let _ = casts.of_light(pairs, light, &mut texels[rows.start - start..rows.end - start]);
         }
         let mut crossings = Crossings::default();
         for (i, (&texel, &vote)) in texels.iter().zip(votes).enumerate() {

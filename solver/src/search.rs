@@ -18,13 +18,13 @@
 //! Guaranteed: the result depends on the input alone, not on threads. Not guaranteed: optimality.
 
 use crate::{
+    crossing::Casts,
     mesh::Mesh,
     pair_table::{LightRows, PairTable, SPARE, SampleSize},
     plane::{PlacedPlane, ShadowPlane, Side},
     proposals::{Place, propose},
     rectangle::{enlarged, shifted, tight_around},
     sampling::hash,
-    shade::CastingPlane,
     smoothing::smoothed,
     window::Window,
 };
@@ -357,17 +357,17 @@ impl<'a> Search<'a> {
     /// Which pairs of the whole table the plane covers.
     fn covered_by(&self, placed: &PlacedPlane, cast: &Cast) -> Vec<bool> {
         let n = self.options.texels;
-        let casting = CastingPlane::new(&placed.plane, placed.side);
-        let of_light = |rows: &LightRows| {
+        let casts = Casts::new(self.table, placed, (n, n));
+        let of_light = |(light, rows): (usize, &LightRows)| {
             let mut texels = vec![0u16; rows.end - rows.start];
             if cast.window[rows.direction] {
-                if self.table.crossings_of_light(rows, (&casting, placed.bias), (n, n), &mut texels) {
+                if casts.of_light(self.table, light, &mut texels) {
                     return texels.iter().map(|&texel| cast.blocked[usize::from(texel)] != 0).collect();
                 }
             }
             vec![false; texels.len()]
         };
-        let parts: Vec<Vec<bool>> = self.table.lights.par_iter().map(of_light).collect();
+        let parts: Vec<Vec<bool>> = self.table.lights.par_iter().enumerate().map(of_light).collect();
         parts.concat()
     }
 }

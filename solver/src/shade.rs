@@ -37,12 +37,11 @@ pub fn duals(plane: &ShadowPlane) -> (Vec3, Vec3) {
 /// What the rows of a plane have in common under all lights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CastingPlane {
-    side: Side,
-    normal: Vec3,
-    dual_a: Vec3,
-    dual_b: Vec3,
+    pub(crate) side: Side,
+    pub(crate) normal: Vec3,
+    pub(crate) duals: [Vec3; 2],
     /// The origin's dot products with the three vectors.
-    origin: [f32; 3],
+    pub(crate) origin: [f32; 3],
 }
 
 impl CastingPlane {
@@ -51,7 +50,7 @@ impl CastingPlane {
     pub fn new(plane: &ShadowPlane, side: Side) -> Self {
         let (normal, (dual_a, dual_b)) = (plane.normal(), duals(plane));
         let origin = [normal, dual_a, dual_b].map(|v| v.dot(plane.origin));
-        Self { side, normal, dual_a, dual_b, origin }
+        Self { side, normal, duals: [dual_a, dual_b], origin }
     }
 
     /// Rows under a light in direction `l`, or `None` where the plane casts nothing: edge-on, without area, or all its
@@ -72,7 +71,7 @@ impl CastingPlane {
         let [n_dot_o, a_dot_o, b_dot_o] = self.origin;
         let s = (-self.normal / n_dot_l).extend(n_dot_o / n_dot_l);
         let row = |dual: Vec3, dual_dot_o: f32| dual.extend(-dual_dot_o) + s * l.dot(dual);
-        Some(PlaneRows { a: row(self.dual_a, a_dot_o), b: row(self.dual_b, b_dot_o), s })
+        Some(PlaneRows { a: row(self.duals[0], a_dot_o), b: row(self.duals[1], b_dot_o), s })
     }
 }
 

@@ -6,12 +6,7 @@
 //! Not guaranteed: the best window. A plane that loses more under all lights than it gains under some starts with a
 //! texture that blocks nothing, and stays there.
 
-use crate::{
-    pair_table::{PairTable, SPARE},
-    plane::PlacedPlane,
-    shade::CastingPlane,
-    smoothing::smoothed,
-};
+use crate::{crossing::Casts, pair_table::PairTable, plane::PlacedPlane, smoothing::smoothed};
 
 /// Rounds of deciding the texture and the window in turn.
 const WINDOW_ROUNDS: usize = 2;
@@ -21,6 +16,8 @@ const WINDOW_ROUNDS: usize = 2;
 pub(crate) struct Window {
     /// Texels a side.
     n: usize,
+    /// The plane under each light.
+    casts: Casts,
     /// Texel of each pair that crosses the rectangle, grouped by light.
     texels: Vec<u16>,
     /// Their votes.
@@ -79,17 +76,17 @@ impl Window {
 
     /// Finds the pairs that cross the rectangle; the others, most of them, are not looked at again.
     fn cross(&mut self, pairs: &PairTable, placed: &PlacedPlane) {
-        let Self { n, texels, pair_votes, lights, of_light, .. } = self;
+        let Self { n, casts, texels, pair_votes, lights, of_light, .. } = self;
         let (outside, mut count) = (*n * *n, 0);
         lights.clear();
         // Every entry up to `count` is written before it is read.
         texels.resize(pairs.len(), 0);
         pair_votes.resize(pairs.len(), 0.0);
-        let casting = CastingPlane::new(&placed.plane, placed.side);
-        for rows in &pairs.lights {
+        casts.renew(pairs, placed, (*n, *n));
+        for (light, rows) in pairs.lights.iter().enumerate() {
             let start = count;
             of_light.resize(rows.end - rows.start, 0);
-            if !pairs.crossings_of_light(rows, (&casting, placed.bias), (*n, *n), of_light) {
+            if !casts.of_light(pairs, light, of_light) {
                 continue;
             }
             for (&texel, &vote) in of_light.iter().zip(&pairs.vote[rows.start..rows.end]) {
