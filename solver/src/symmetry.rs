@@ -37,7 +37,7 @@ pub struct Measured {
 }
 
 /// Most disagreement of a mirror. Planes fitted to both halves are wrong about half of it, at most 0.005 of the shadow;
-/// the best fits leave 0.04 and more. Twelve models drawn as a mirror gave 0.0000 to 0.0038 (an airliner 0.0025, a teapot
+/// the best fits leave 0.04 and more. Thirteen models drawn as a mirror gave 0.0000 to 0.0038 (an airliner 0.0025, a teapot
 /// whose diagonals run all one way 0.0003), a lantern whose handle hangs to one side 0.016, a truck 0.019.
 pub const MAX_DISAGREEMENT: f64 = 0.01;
 
