@@ -26,23 +26,24 @@ use rayon::prelude::*;
 /// Joins the tables of each two sections. `directions` are those of the tables, their own image together.
 #[must_use]
 pub fn folded(tables: Vec<PairTable>, mirror: &Mirror, directions: &[Vec3]) -> Vec<PairTable> {
-    tables.into_par_iter().chunks(2).map(|halves| joined(&halves, mirror, directions)).collect()
+    tables.into_par_iter().chunks(2).map(|halves| joined(halves, mirror, directions)).collect()
 }
 
 /// The pairs of a near section and, folded, those of its image, if it has any.
-fn joined(halves: &[PairTable], mirror: &Mirror, directions: &[Vec3]) -> PairTable {
-    let near = &halves[0];
+fn joined(halves: Vec<PairTable>, mirror: &Mirror, directions: &[Vec3]) -> PairTable {
+    let mut halves = halves.into_iter();
+    let near = halves.next().unwrap_or_default();
     let nothing = || PairTable {
         lights: near.lights.iter().map(|rows| LightRows { start: 0, end: 0, ..*rows }).collect(),
         ..PairTable::default()
     };
-    let far = halves.get(1).cloned().unwrap_or_else(nothing);
+    let far = halves.next().unwrap_or_else(nothing);
     // Lights of both, sorted by direction; of one direction the near half's first.
     let image = |rows: &LightRows| {
         let light = mirror.vector(rows.light) + Vec3::ZERO;
         LightRows { light, direction: nearest(directions, light), ..*rows }
     };
-    let near_rows = near.lights.iter().map(|rows| (*rows, near, None));
+    let near_rows = near.lights.iter().map(|rows| (*rows, &near, None));
     let mut order: Vec<_> = near_rows.chain(far.lights.iter().map(|rows| (image(rows), &far, Some(mirror)))).collect();
     order.sort_by_key(|(rows, ..)| rows.direction);
     let receivers = near.receivers + far.receivers;
