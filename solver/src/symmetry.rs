@@ -50,8 +50,8 @@ pub const MAX_UNMATCHED: f64 = 0.02;
 /// car's bonnet, 6 % of its light, was missing. At 0.01 plates are taken for each other's images, and shadows differ.
 const TOLERANCE: f32 = 3e-3;
 
-/// Smallest cosine between a surface's normal and the image of the receiver's: 18 degrees, for the same patches.
-const SAME_NORMAL: f32 = 0.95;
+/// Smallest cosine between a surface's normal and the image of the receiver's: 8 degrees, for the same patches.
+const SAME_NORMAL: f32 = 0.99;
 
 /// Receivers that are mirrored: with the pilot's lights some 60,000 pairs, a third of them blocked.
 const RECEIVERS: usize = 2048;
