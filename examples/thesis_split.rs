@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let by_hand: Vec<u32> = mesh.corners.iter().map(|[a, b, c]| hand_section(&mesh, (*a + *b + *c) / 3.0)).collect();
     let pilot = sampled(&mesh, PILOT, SEEDS[0]);
     let units: Vec<u32> = (0..mesh.triangle_count() as u32).collect();
-    let automatic = sections::divide(&mesh, &units, (&pilot.0, &pilot.1), 3);
+    let automatic = sections::divide(&mesh, &units, (&pilot.0, &pilot.1), 3, None);
     println!("planes/section  division   planes  shadow_error  missed  false");
     for planes in if given.is_empty() { PLANES.to_vec() } else { given } {
         for (name, section_of) in [("by hand", &by_hand), ("automatic", &automatic)] {

@@ -98,7 +98,7 @@ impl Lookups {
 pub struct CurvePoint {
     /// Planes.
     pub planes: usize,
-    /// Bytes of their textures, one a texel, before they are packed.
+    /// Bytes of their textures, one a texel, before they are packed; shared ones count once.
     pub texture_bytes: usize,
     /// Held out.
     pub shadow_error: f64,
@@ -141,7 +141,7 @@ impl CurvePoint {
     #[must_use]
     pub fn new(set: &BakedSet, metrics: &Metrics, seconds: f64) -> Self {
         let Metrics { shadow_error, missed, false_, .. } = *metrics;
-        let texture_bytes = set.planes.iter().map(|baked| baked.texture.texels.len()).sum();
+        let texture_bytes = set.texture_bytes();
         Self { planes: set.planes.len(), texture_bytes, shadow_error, missed, false_, seconds }
     }
 }

@@ -84,7 +84,7 @@ pub fn fit(soup: &Soup, settings: &Settings) -> Fitted {
             let pilot = receivers(&mesh, 4_000, hash(seed, 1));
             let pairs = trace(&mesh, &pilot, &domain.directions(48, hash(seed, 1)), domain.solid_angle());
             let units: Vec<u32> = (0..mesh.triangle_count() as u32).collect();
-            let section_of = sections::divide(&mesh, &units, (&pilot, &pairs), sections);
+            let section_of = sections::divide(&mesh, &units, (&pilot, &pairs), sections, None);
             let (pairs, lights) = TRAINING;
             let options = TraceOptions { pairs, lights, stride: 4, exposure_rays: 16, seed: hash(seed, 3) };
             let tables = sections::trace(&mesh, &section_of, &directions, domain, &options);

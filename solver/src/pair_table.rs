@@ -97,8 +97,7 @@ impl PairTable {
             let end = table.len();
             table.push_light(LightRows { light: light.light, direction, fold: position % 2, start, end });
         }
-        let points = || (0..table.len()).map(|i| table.point(i));
-        table.bounds = [points().fold(Vec3::INFINITY, Vec3::min), points().fold(Vec3::NEG_INFINITY, Vec3::max)];
+        table.bound();
         table
     }
 
@@ -112,7 +111,14 @@ impl PairTable {
         self.receiver.extend(std::iter::repeat_n(self.receiver.last().copied().unwrap_or_default(), count));
     }
 
-    fn push_light(&mut self, rows: LightRows) {
+    /// Measures the box of the receivers.
+    pub(crate) fn bound(&mut self) {
+        let points = || (0..self.len()).map(|i| self.point(i));
+        self.bounds = [points().fold(Vec3::INFINITY, Vec3::min), points().fold(Vec3::NEG_INFINITY, Vec3::max)];
+    }
+
+    /// Adds the rows of a light.
+    pub(crate) fn push_light(&mut self, rows: LightRows) {
         let lane = self.lights.len() % LANES;
         if lane == 0 {
             self.light_lanes.push([[0.0; LANES]; 3]);

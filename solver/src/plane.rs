@@ -3,6 +3,7 @@
 use crate::pair_table::nearest;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 
 /// A rectangle (or, under a sheared node, a parallelogram) that casts shadow.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +65,7 @@ pub enum Encoding {
 pub const SDF_BORDER: f32 = 0.5;
 
 /// What a rectangle blocks. The outermost ring of texels is open: 0 as coverage, below 128 in a distance field.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct OccluderTexture {
     /// Texels along u, at least 3.
     pub width: usize,
@@ -85,6 +86,21 @@ impl OccluderTexture {
             Encoding::Sdf => f32::from(texel) < SDF_BORDER * 255.0,
         }
     }
+}
+
+/// The textures that differ, in the order of their first appearance, and which of them each one is. Planes with equal
+/// textures share one: only these have to be stored.
+#[must_use]
+pub fn distinct<'a>(textures: impl IntoIterator<Item = &'a OccluderTexture>) -> (Vec<&'a OccluderTexture>, Vec<usize>) {
+    let (mut found, mut known) = (Vec::new(), HashMap::new());
+    let mut number = |texture| {
+        *known.entry(texture).or_insert_with(|| {
+            found.push(texture);
+            found.len() - 1
+        })
+    };
+    let numbers = textures.into_iter().map(&mut number).collect();
+    (found, numbers)
 }
 
 /// One plane, ready to cast.
@@ -130,6 +146,12 @@ impl BakedSet {
     pub fn one_section(planes: Vec<BakedPlane>) -> Self {
         let all = (0..planes.len() as u32).collect();
         Self { planes, sections: vec![all], active: None }
+    }
+
+    /// Bytes of the textures, one a texel; shared ones count once.
+    #[must_use]
+    pub fn texture_bytes(&self) -> usize {
+        distinct(self.planes.iter().map(|baked| &baked.texture)).0.iter().map(|texture| texture.texels.len()).sum()
     }
 
     /// The planes that each section reads under a light in direction `l`.

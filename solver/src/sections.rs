@@ -15,6 +15,7 @@ use crate::{
     pair_table::PairTable,
     receivers::{ReceiverOptions, Receivers, sample_triangles},
     sampling::hash,
+    symmetry::Mirror,
     visibility::{Pairs, trace_drawn},
 };
 use glam::Vec3;
@@ -63,9 +64,21 @@ fn distance(a: &Feature, b: &Feature) -> f32 {
 }
 
 /// Section of each triangle of the mesh, below `count`. Triangles with the same entry in `unit_of` are one in the file
-/// and get the same section.
+/// and get the same section. With a mirror, section 2k + 1 is what lies where the image of section 2k does: both halves
+/// are folded onto the near one before they are clustered.
 #[must_use]
-pub fn divide(mesh: &Mesh, unit_of: &[u32], (receivers, pairs): (&Receivers, &Pairs), count: usize) -> Vec<u32> {
+pub fn divide(
+    mesh: &Mesh,
+    unit_of: &[u32],
+    (receivers, pairs): (&Receivers, &Pairs),
+    count: usize,
+    mirror: Option<&Mirror>,
+) -> Vec<u32> {
+    let halves = if mirror.is_some() { 2 } else { 1 };
+    let folded = |p: Vec3, n: Vec3| match mirror {
+        Some(mirror) if mirror.is_far(p) => (feature(mirror.point(p), mirror.vector(n)), 1),
+        _ => (feature(p, n), 0),
+    };
     let mut weights = vec![0.0f64; receivers.points.len()];
     for light in &pairs.lights {
         for (&vote, &receiver) in light.vote.iter().zip(&light.receiver) {
@@ -74,12 +87,15 @@ pub fn divide(mesh: &Mesh, unit_of: &[u32], (receivers, pairs): (&Receivers, &Pa
         }
     }
     let features: Vec<Feature> =
-        receivers.points.iter().zip(&receivers.normals).map(|(p, n)| feature(*p, *n)).collect();
-    let centres = cluster(&features, &weights, count);
+        receivers.points.iter().zip(&receivers.normals).map(|(p, n)| folded(*p, *n).0).collect();
+    let centres = cluster(&features, &weights, (count / halves).max(1));
     let mut section_of_unit: HashMap<u32, u32> = HashMap::new();
     let section = |triangle: usize| {
         let [a, b, c] = mesh.corners[triangle];
-        let own = || nearest(&centres, &feature((a + b + c) / 3.0, mesh.normals[triangle])) as u32;
+        let own = || {
+            let (feature, half) = folded((a + b + c) / 3.0, mesh.normals[triangle]);
+            (nearest(&centres, &feature) * halves + half) as u32
+        };
         *section_of_unit.entry(unit_of[triangle]).or_insert_with(own)
     };
     (0..mesh.triangle_count()).map(section).collect()

@@ -54,7 +54,7 @@ fn divided() -> Divided {
     let pilot = scenes::receivers(&mesh, 2_000, 9);
     let pilot_pairs = pairs(&mesh, &Sampling { receivers: 2_000, lights: 48, seed: 9, ..TRAINING });
     let units: Vec<u32> = (0..mesh.triangle_count() as u32).collect();
-    let section_of = sections::divide(&mesh, &units, (&pilot, &pilot_pairs), 5);
+    let section_of = sections::divide(&mesh, &units, (&pilot, &pilot_pairs), 5, None);
     let directions = list_directions(&options);
     let trace = TraceOptions { pairs: 400_000, lights: 192, stride: 2, exposure_rays: 16, seed: 3 };
     let tables = sections::trace(&mesh, &section_of, &directions, LightDomain::Sphere, &trace);

@@ -218,7 +218,7 @@ fn sections_get_pairs_of_their_own_surface_under_the_same_lights() {
     let units: Vec<u32> = (0..mesh.triangle_count() as u32).map(|i| i / 2).collect();
     let directions = list_directions(&fit_options(domain, 1, 1));
     for count in [1, 2, 7, 40] {
-        let section_of = sections::divide(&mesh, &units, (&receivers, &pilot), count);
+        let section_of = sections::divide(&mesh, &units, (&receivers, &pilot), count, None);
         assert_eq!(section_of.len(), mesh.triangle_count());
         assert!(section_of.chunks(2).all(|copies| copies[0] == copies[1]), "copies lie in two sections");
         assert!(section_of.iter().all(|section| (*section as usize) < count));

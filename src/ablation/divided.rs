@@ -99,7 +99,7 @@ fn plan_of(bench: &Bench, sections: Option<usize>, max_lookups: Option<usize>) -
 /// The division of the method.
 fn clusters(bench: &Bench, count: usize) -> Vec<u32> {
     let (receivers, pairs) = &bench.pilot;
-    divide(bench.mesh, &units(bench.scene, bench.mesh), (receivers, pairs), count)
+    divide(bench.mesh, &units(bench.scene, bench.mesh), (receivers, pairs), count, None)
 }
 
 /// Triangles go to the nearest of `count` random points of the surface.

@@ -143,8 +143,7 @@ impl<'a> Training<'a> {
         let pairs = &self.bench.pairs;
         let metrics = measure(set, pairs, &self.section_of);
         let lookups = Lookups::measure(set, pairs, &self.section_of).mean;
-        let texture_bytes = set.planes.iter().map(|baked| baked.texture.texels.len()).sum();
-        Point::new((set.planes.len(), lookups), &metrics, texture_bytes, seconds)
+        Point::new((set.planes.len(), lookups), &metrics, set.texture_bytes(), seconds)
     }
 
     /// The encoding that the bake chooses.

@@ -14,8 +14,8 @@ use super::AssetError;
 use image::{ExtendedColorType, ImageEncoder, codecs::png};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use shadowfit_solver::plane::OccluderTexture;
-use std::{cmp::Reverse, collections::HashMap};
+use shadowfit_solver::plane::{OccluderTexture, distinct};
+use std::cmp::Reverse;
 
 /// Longest side of an atlas: every WebGL2 and WebGPU device takes 4096 or more in practice (2048 and 8192 are
 /// the specified minima).
@@ -201,19 +201,14 @@ pub struct Atlas {
 /// A texture whose size does not fit its texels, that is smaller than 3 x 3 or larger than [`MAX_SIDE_PX`], or
 /// whose outermost ring is not open.
 pub fn build(textures: &[&OccluderTexture]) -> Result<(Layout, Vec<Atlas>), AssetError> {
-    let (mut sizes, mut known, mut number_of) = (Vec::new(), HashMap::new(), Vec::with_capacity(textures.len()));
     for (plane, texture) in textures.iter().enumerate() {
-        let size = checked_size(texture).map_err(|why| AssetError::Plane { plane, why })?;
-        let number = *known.entry((size, texture.encoding, &texture.texels)).or_insert(sizes.len());
-        if number == sizes.len() {
-            sizes.push(size);
-        }
-        number_of.push(number);
+        checked_size(texture).map_err(|why| AssetError::Plane { plane, why })?;
     }
+    let (stored, number_of) = distinct(textures.iter().copied());
+    let sizes: Vec<[u32; 2]> = stored.iter().map(|texture| [texture.width as u32, texture.height as u32]).collect();
     let mut layout = pack(&sizes).ok_or(AssetError::Plane { plane: 0, why: "the textures cannot be packed".into() })?;
-    layout.placements = number_of.iter().map(|&number| layout.placements[number]).collect();
     let mut pixels: Vec<Vec<u8>> = layout.atlases.iter().map(|[w, h]| vec![0; 3 * *w as usize * *h as usize]).collect();
-    for (texture, place) in textures.iter().zip(&layout.placements) {
+    for (texture, place) in stored.iter().zip(&layout.placements) {
         let width = layout.atlases[place.atlas][0] as usize;
         for (row, texels) in texture.texels.chunks_exact(texture.width).enumerate() {
             let start = (place.y as usize + row) * width + place.x as usize;
@@ -222,6 +217,7 @@ pub fn build(textures: &[&OccluderTexture]) -> Result<(Layout, Vec<Atlas>), Asse
             }
         }
     }
+    layout.placements = number_of.iter().map(|&number| layout.placements[number]).collect();
     let encoded = layout
         .atlases
         .iter()

@@ -2,10 +2,10 @@
 //!
 //! Shelf packing (J. Jylanki, "A Thousand Ways to Pack the Bin", 2010, SHELF-NF by falling height): textures fill
 //! rows, rows fill a channel, channels fill layers. Regions touch: taps are clamped to the region, so no texel of
-//! a neighbour is read.
+//! a neighbour is read. Equal textures share a slot.
 
 use super::RenderError;
-use shadowfit_solver::plane::{Encoding, OccluderTexture};
+use shadowfit_solver::plane::{Encoding, OccluderTexture, distinct};
 
 /// Where one texture lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -41,7 +41,8 @@ impl Atlas {
     /// # Errors
     /// [`RenderError::TooLarge`] where they do not fit.
     pub fn pack(textures: &[&OccluderTexture], max_side: u32, max_layers: u32) -> Result<Self, RenderError> {
-        let side = layer_side(textures);
+        let (stored, number_of) = distinct(textures.iter().copied());
+        let side = layer_side(&stored);
         if side > max_side {
             return Err(RenderError::TooLarge {
                 what: "the sides of occluder textures",
@@ -49,7 +50,7 @@ impl Atlas {
                 limit: u64::from(max_side),
             });
         }
-        let slots = shelve(textures, side);
+        let slots = shelve(&stored, side);
         let used = slots.iter().map(|slot| slot.layer + 1).max().unwrap_or(1);
         let layers = if used == 1 || used % 6 == 0 { used + 1 } else { used };
         if layers > max_layers {
@@ -60,9 +61,10 @@ impl Atlas {
             });
         }
         let mut rgba = vec![0; 4 * side as usize * side as usize * layers as usize];
-        for (texture, slot) in textures.iter().zip(&slots) {
+        for (texture, slot) in stored.iter().zip(&slots) {
             copy(texture, slot, side as usize, &mut rgba);
         }
+        let slots = number_of.into_iter().map(|number| slots[number]).collect();
         Ok(Self { side, layers, rgba, slots })
     }
 }
@@ -142,7 +144,18 @@ mod tests {
     #[test]
     fn a_texture_above_the_limit_is_an_error() {
         assert!(matches!(Atlas::pack(&[&texture(65, 3, 1)], 64, 4), Err(RenderError::TooLarge { .. })));
-        let full = texture(64, 64, 1);
-        assert!(matches!(Atlas::pack(&[&full; 17], 64, 4), Err(RenderError::TooLarge { .. })));
+        let full: Vec<_> = (1..=17).map(|texel| texture(64, 64, texel)).collect();
+        assert!(matches!(Atlas::pack(&full.iter().collect::<Vec<_>>(), 64, 4), Err(RenderError::TooLarge { .. })));
+    }
+
+    #[test]
+    fn equal_textures_share_a_slot() {
+        let [a, b] = [1, 2].map(|texel| texture(64, 64, texel));
+        let atlas = Atlas::pack(&[&a, &b, &a, &a.clone(), &b], 64, 4).unwrap();
+        assert_eq!(atlas.slots[0], atlas.slots[2]);
+        assert_eq!(atlas.slots[0], atlas.slots[3]);
+        assert_eq!(atlas.slots[1], atlas.slots[4]);
+        assert_ne!(atlas.slots[0], atlas.slots[1]);
+        assert_eq!(atlas.rgba.iter().filter(|&&byte| byte != 0).count(), 2 * 64 * 64);
     }
 }

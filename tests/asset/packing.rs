@@ -1,8 +1,18 @@
 //! The atlas: no texture overlaps another, whatever the sizes.
 
-use crate::fixtures::{Numbers, texture};
-use shadowfit::asset::atlas::{self, Layout, pack};
-use shadowfit_solver::plane::{Encoding, OccluderTexture};
+use crate::fixtures::{self, FRAME, Folders, Numbers, document, glb, request, texture, triangle};
+use glam::Vec3;
+use serde_json::Value;
+use shadowfit::asset::{
+    AssetRequest,
+    atlas::{self, Layout, pack},
+    read, write,
+};
+use shadowfit_solver::{
+    halves::unfolded,
+    plane::{BakedSet, Encoding, OccluderTexture},
+    symmetry::Mirror,
+};
 
 fn assert_disjoint(sizes: &[[u32; 2]], layout: &Layout) {
     assert_eq!(layout.placements.len(), sizes.len());
@@ -87,6 +97,42 @@ fn equal_textures_share_a_region() {
     assert_eq!([place[2], place[5], place[8]], [place[0], place[1], place[6]]);
     let places: std::collections::BTreeSet<_> = place.iter().map(|p| (p.atlas, p.channel as usize, p.x, p.y)).collect();
     assert_eq!((places.len(), atlases.len()), (6, 1));
+}
+
+/// Both halves of a mirrored set name the same regions, and only one half's texels are stored.
+#[test]
+fn mirrored_planes_share_their_regions_in_the_files() {
+    let half = fixtures::active_set(fixtures::planes(3));
+    let set = unfolded(half.clone(), &Mirror::new(Vec3::X, 0.0));
+    assert_eq!((set.planes.len(), set.sections.len(), set.texture_bytes()), (6, 2, half.texture_bytes()));
+    let folders = Folders::new();
+    let input = folders.input("m.glb", &glb(&document("", ""), Some(&triangle())));
+    let out = folders.out();
+    let origins = shadowfit::scene::load(&input).unwrap().origins;
+    let request =
+        AssetRequest { origins: &origins, section_of: &vec![1; origins.len()], ..request(&input, &out, &set) };
+    let written = write(&request).unwrap();
+    assert_eq!(written.texture_bytes, atlas_bytes(&half));
+    let sidecar: Value = serde_json::from_slice(&std::fs::read(&written.sidecar).unwrap()).unwrap();
+    let planes = sidecar["sets"][0]["planes"].as_array().unwrap();
+    for (near, far) in planes[..3].iter().zip(&planes[3..]) {
+        for member in ["occluderTexture", "region", "channel", "encoding", "bias"] {
+            assert_eq!(near[member], far[member], "{member}");
+        }
+        assert_ne!(near["origin"], far["origin"]);
+    }
+    for path in [&written.model, &written.sidecar] {
+        let back = read(path).unwrap().in_unit_space(&FRAME);
+        assert_eq!((&back.sections, &back.active), (&set.sections, &set.active));
+        for (a, b) in back.planes.iter().zip(&set.planes) {
+            assert_eq!((&a.texture, a.side), (&b.texture, b.side));
+            assert!(a.plane.origin.distance(b.plane.origin) < 1e-6 && a.plane.u.distance(b.plane.u) < 1e-6);
+        }
+    }
+}
+
+fn atlas_bytes(set: &BakedSet) -> u64 {
+    atlas::build(&set.planes.iter().map(|baked| &baked.texture).collect::<Vec<_>>()).unwrap().0.texture_bytes()
 }
 
 #[test]
