@@ -82,11 +82,11 @@ impl Effort {
     pub fn balanced() -> Self {
         let whole = Plan {
             sections: 1,
-            trace: TraceOptions { pairs: 4_000_000, lights: 1024, stride: 4, exposure_rays: 24, seed: 0 },
+            trace: TraceOptions { pairs: 3_000_000, lights: 1024, stride: 4, exposure_rays: 24, seed: 0 },
             directions: 96,
             search: SearchOptions {
                 max_planes: 12,
-                proposals: 800,
+                proposals: 500,
                 screening: SampleSize { lights: 64, pairs: 30_000 },
                 screening_texels: 48,
                 finalists: 24,

@@ -13,7 +13,7 @@ use crate::{
 use glam::Vec3;
 use rayon::prelude::*;
 use shadowfit_solver::{
-    budget::BudgetOptions,
+    budget::{BudgetOptions, Sizing},
     certificate::Certificate,
     columns::{ColumnOptions, certify_found},
     fit::{bake, bake_within},
@@ -22,7 +22,7 @@ use shadowfit_solver::{
     mesh::Mesh,
     metrics::{Metrics, measure, measure_tables},
     pair_table::{PairTable, SampleSize},
-    plane::{BakedSet, PlacedPlane, distinct},
+    plane::{BakedSet, Encoding, PlacedPlane, distinct},
     receivers::{ReceiverOptions, Receivers, sample},
     search::{Found, SearchOptions, Verdict, place, search},
     sections,
@@ -51,7 +51,10 @@ const TARGET_MIN_GAIN: f64 = 5e-4;
 const TARGET_MAX_PLANES: usize = 64;
 
 /// Pairs on which the sets of the curve and of `--max-error` are baked, and their lights.
-const CURVE_SAMPLE: SampleSize = SampleSize { lights: 1024, pairs: 1_500_000 };
+const CURVE_SAMPLE: SampleSize = SampleSize { lights: 512, pairs: 500_000 };
+
+/// Most texels a side of their textures: distance fields gain little from more.
+const CURVE_TEXELS: usize = 64;
 
 /// Shares of the budget that textures may take, so that their atlases stay within it: the first that does. Atlases of
 /// hundreds of textures are 95 % full and more, of a dozen 80 %.
@@ -275,9 +278,15 @@ impl Fit<'_> {
         let start = Instant::now();
         let sample = table.sample(CURVE_SAMPLE, self.request.seed);
         let quick = ListOptions { rounds: 1, ..self.plan.lists };
-        let bake_prefix = |planes: &[Found]| {
-            bake(&[assign(&sample, planes, &quick)], &self.directions, self.shadow, &self.plan.budget)
+        let budget = &self.plan.budget;
+        let texels = BudgetOptions {
+            texture_size: budget.texture_size.min(CURVE_TEXELS),
+            sizing: Sizing::Largest,
+            encoding: budget.encoding.or(Some(Encoding::Sdf)),
+            ..*budget
         };
+        let bake_prefix =
+            |planes: &[Found]| bake(&[assign(&sample, planes, &quick)], &self.directions, self.shadow, &texels);
         let judging =
             self.request.max_error.map(|target| (target, held_out(self.mesh, self.request, JUDGING, Purpose::Judging)));
         let mut found_at_s = Vec::new();
