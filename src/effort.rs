@@ -111,7 +111,7 @@ impl Effort {
         };
         let divided = Plan {
             sections: 96,
-            trace: TraceOptions { pairs: 14_000_000, lights: 2048, stride: 8, exposure_rays: 16, seed: 0 },
+            trace: TraceOptions { pairs: 8_000_000, lights: 2048, stride: 8, exposure_rays: 16, seed: 0 },
             directions: 192,
             search: SearchOptions {
                 max_planes: 16,
@@ -127,8 +127,8 @@ impl Effort {
                 seed: 0,
             },
             min_gain: 3e-6,
-            lists: ListOptions { max_lookups: 4, grid: 128, rounds: 3, smoothing: 1 },
-            budget: BudgetOptions { byte_gain: 2e-10, smoothing: 1, ..whole.budget },
+            lists: ListOptions { max_lookups: 4, grid: 200, rounds: 2, smoothing: 1 },
+            budget: BudgetOptions { byte_gain: 5e-11, smoothing: 1, ..whole.budget },
         };
         Self { whole, divided }
     }
@@ -156,11 +156,16 @@ impl Effort {
                 sections: 160,
                 trace: TraceOptions { pairs: 48_000_000, lights: 4096, ..divided.trace },
                 search: SearchOptions {
-                    max_planes: 20,
-                    scoring: SampleSize { lights: 4096, pairs: 48_000 },
+                    max_planes: 30,
+                    proposals: 400,
+                    refined: 3,
+                    scoring: SampleSize { lights: 4096, pairs: 96_000 },
+                    texels: 64,
                     ..divided.search
                 },
-                lists: ListOptions { grid: 160, ..divided.lists },
+                min_gain: 1e-6,
+                lists: ListOptions { grid: 255, rounds: 3, ..divided.lists },
+                budget: BudgetOptions { byte_gain: 2e-11, ..divided.budget },
                 ..divided
             },
         }
