@@ -160,12 +160,12 @@ impl LanesOf {
                 );
                 let [low, high] = self.range(row);
                 crosses &= (high >= 0.0) & (low < 1.0);
-                for c in 0..4 {
-                    out.rows[k][c][i] = row[c] * self.size[k];
+                for (lane, x) in out.rows[k].iter_mut().zip(row) {
+                    lane[i] = x * self.size[k];
                 }
             }
-            for c in 0..4 {
-                out.rows[2][c][i] = s[c];
+            for (lane, x) in out.rows[2].iter_mut().zip(s) {
+                lane[i] = x;
             }
             out.crosses[i] = u8::from(crosses);
         }

@@ -360,12 +360,11 @@ impl<'a> Search<'a> {
         let casts = Casts::new(self.table, placed, (n, n));
         let of_light = |(light, rows): (usize, &LightRows)| {
             let mut texels = vec![0u16; rows.end - rows.start];
-            if cast.window[rows.direction] {
-                if casts.of_light(self.table, light, &mut texels) {
-                    return texels.iter().map(|&texel| cast.blocked[usize::from(texel)] != 0).collect();
-                }
+            if cast.window[rows.direction] && casts.of_light(self.table, light, &mut texels) {
+                texels.iter().map(|&texel| cast.blocked[usize::from(texel)] != 0).collect()
+            } else {
+                vec![false; texels.len()]
             }
-            vec![false; texels.len()]
         };
         let parts: Vec<Vec<bool>> = self.table.lights.par_iter().enumerate().map(of_light).collect();
         parts.concat()
