@@ -7,10 +7,19 @@
 //!
 //! Each case is one run of the release binary beside this example, so that time and memory are its own. The first
 //! writes `reports/baseline/models.{csv,md}`: preset balanced; the second `reports/baseline/corpus.{csv,md}`: preset fast;
-//! the third `reports/baseline/settings.{csv,md}`: lookups and bytes against error, preset balanced without frames.
+//! the third `reports/baseline/settings.{csv,md}`: lookups and bytes against error, without frames, with the size of the
+//! shadow map that leaves the same error (`shadow_map::equivalent_size`, on held-out pairs of its own).
 //! Frames are those of the short validation: the full one takes a minute and more a case without a GPU.
 
 use serde_json::Value;
+use shadowfit::scene;
+use shadowfit_solver::{
+    lights::LightDomain,
+    mesh::Mesh,
+    receivers::{ReceiverOptions, sample},
+    shadow_map::{EquivalentSize, SIZES, equivalent_size},
+    visibility::trace,
+};
 use std::{
     error::Error,
     fmt::Write as _,
@@ -46,18 +55,37 @@ const COLUMNS: [(&str, &str); 16] = [
     ("peak_bytes", "/peak_memory_bytes"),
 ];
 
+/// A table: its name, the arguments of all its runs, what its last column has.
+struct Table {
+    name: &'static str,
+    arguments: [&'static str; 2],
+    maps: Maps,
+}
+
+/// Are shadow maps measured beside?
+#[derive(PartialEq)]
+enum Maps {
+    Left,
+    Measured,
+}
+
+const MODELS: Table = Table { name: "models", arguments: ["--preset", "balanced"], maps: Maps::Left };
+const CORPUS: Table = Table { name: "corpus", arguments: ["--preset", "fast"], maps: Maps::Left };
+const SETTINGS: Table = Table { name: "settings", arguments: ["--validate", "none"], maps: Maps::Measured };
+
+/// Receivers, exposure rays and lights on which shadow maps are measured, and their seed.
+const MAP_SAMPLING: (usize, usize, usize, u64) = (8_000, 32, 61, 4242);
+
 fn main() -> Result<(), Box<dyn Error>> {
     let binary = std::env::current_exe()?.ancestors().nth(2).map(|dir| dir.join("shadowfit")).ok_or("no binary")?;
     if !binary.exists() {
         return Err(format!("{} is missing: cargo build --release --features flip", binary.display()).into());
     }
     match (std::env::args().nth(1), std::env::args().nth(2).as_deref()) {
-        (None, _) => run("models", &own_cases(), &binary, &["--preset", "balanced"]),
-        (Some(folder), Some("settings")) => {
-            run("settings", &settings_cases(Path::new(&folder))?, &binary, &["--validate", "none"])
-        }
+        (None, _) => run(&MODELS, &own_cases(), &binary),
+        (Some(folder), Some("settings")) => run(&SETTINGS, &settings_cases(Path::new(&folder))?, &binary),
         (Some(_), Some(other)) => Err(format!("{other}: only 'settings' is known").into()),
-        (Some(folder), None) => run("corpus", &corpus_cases(Path::new(&folder))?, &binary, &["--preset", "fast"]),
+        (Some(folder), None) => run(&CORPUS, &corpus_cases(Path::new(&folder))?, &binary),
     }
 }
 
@@ -164,8 +192,9 @@ const OTHER_SETTINGS: [(&str, &[&str]); 7] = [
 const BOTH: [&str; 2] = ["--preset balanced --max-planes 8", "--preset balanced --max-lookups 4"];
 
 /// Runs the cases and writes the tables after each, so that a run that is cut short leaves what it has.
-fn run(table: &str, cases: &[Case], binary: &Path, common: &[&str]) -> Result<(), Box<dyn Error>> {
-    let titles: Vec<&str> = COLUMNS.iter().map(|(title, _)| *title).collect();
+fn run(table: &Table, cases: &[Case], binary: &Path) -> Result<(), Box<dyn Error>> {
+    let mut titles: Vec<&str> = COLUMNS.iter().map(|(title, _)| *title).collect();
+    titles.extend((table.maps == Maps::Measured).then_some("shadow_map_texels"));
     let mut csv = format!("case,exit,{}\n", titles.join(","));
     let mut markdown = format!("| case | exit | {} |\n|---|{}\n", titles.join(" | "), "---|".repeat(titles.len() + 1));
     fs::create_dir_all("reports/baseline")?;
@@ -173,7 +202,7 @@ fn run(table: &str, cases: &[Case], binary: &Path, common: &[&str]) -> Result<()
         let out = tempfile::tempdir()?;
         let output = Command::new(binary)
             .args(["fit", "--json"])
-            .args(common)
+            .args(table.arguments)
             .arg("-o")
             .arg(out.path())
             .arg(&case.model)
@@ -181,14 +210,31 @@ fn run(table: &str, cases: &[Case], binary: &Path, common: &[&str]) -> Result<()
             .output()?;
         let report: Value = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
         let exit = output.status.code().map_or_else(|| "signal".to_string(), |code| code.to_string());
-        let cells: Vec<String> = COLUMNS.iter().map(|(_, pointer)| cell(report.pointer(pointer))).collect();
+        let mut cells: Vec<String> = COLUMNS.iter().map(|(_, pointer)| cell(report.pointer(pointer))).collect();
+        if let (Maps::Measured, Some(error)) = (&table.maps, report["held_out"]["shadow_error"].as_f64()) {
+            cells.push(shadow_map_texels(&case.model, error)?);
+        }
         writeln!(csv, "{},{exit},{}", case.name, cells.join(","))?;
         writeln!(markdown, "| {} | {exit} | {} |", case.name, cells.join(" | "))?;
         println!("{} exit {exit}: {}", case.name, cells.join(" "));
-        fs::write(format!("reports/baseline/{table}.csv"), &csv)?;
-        fs::write(format!("reports/baseline/{table}.md"), &markdown)?;
+        fs::write(format!("reports/baseline/{}.csv", table.name), &csv)?;
+        fs::write(format!("reports/baseline/{}.md", table.name), &markdown)?;
     }
     Ok(())
+}
+
+/// Texels a side of the shadow map that leaves `error` on this model.
+fn shadow_map_texels(model: &Path, error: f64) -> Result<String, Box<dyn Error>> {
+    let mesh = Mesh::new(&scene::load(model)?.soup)?;
+    let (count, exposure_rays, lights, seed) = MAP_SAMPLING;
+    let receivers = sample(&mesh, &ReceiverOptions { count, exposure_rays, seed });
+    let domain = LightDomain::Sphere;
+    let pairs = trace(&mesh, &receivers, &domain.directions(lights, seed), domain.solid_angle());
+    Ok(match equivalent_size(&mesh, &receivers, &pairs, error) {
+        EquivalentSize::BelowAll => format!("<{}", SIZES[0]),
+        EquivalentSize::Texels(texels) => format!("{texels:.0}"),
+        EquivalentSize::AboveAll => format!(">{}", SIZES[SIZES.len() - 1]),
+    })
 }
 
 /// Whole numbers as they are, others with four digits after the point, nothing where there is none.
