@@ -55,9 +55,8 @@ impl Effort {
                     finalists: 12,
                     refined: 2,
                     scoring: SampleSize { lights: 128, pairs: 60_000 },
-                    texels: 40,
+                    texels: 48,
                     refine_steps: 4,
-                    replace_rounds: 0,
                     ..whole.search
                 },
                 lists: ListOptions { grid: 160, rounds: 2, ..whole.lists },

@@ -48,7 +48,7 @@ pub struct SearchOptions {
     /// What finalists are measured on.
     pub scoring: SampleSize,
     /// Texels a side of their textures, 32 to 128. With too few pairs a texel gains are noise: 11 planes on teapot_three
-    /// from 150,000 pairs left 0.133 with 96 texels and 0.130 with 64, from 60,000 pairs 0.168 with 64 and 0.161 with 40.
+    /// from 150,000 pairs left 0.133 with 96 texels and 0.130 with 64, from 60,000 pairs 0.168 with 64 and 0.161 with 40 (three seeds).
     pub texels: usize,
     /// Halvings of the refinement's step.
     pub refine_steps: usize,

@@ -4,7 +4,9 @@
 //! window by what the texture gains, in turn; gains are counted under lights that did not decide the texture.
 //!
 //! Not guaranteed: the best window. A plane that loses more under all lights than it gains under some starts with a
-//! texture that blocks nothing, and stays there.
+//! texture that blocks nothing, and stays there. Starting also from the directions on either side of the plane, and
+//! taking the best of the three, did not pay (mean of four seeds): teapot_three with 11 planes 0.135 instead of 0.128,
+//! cesium_air with 8 0.136 instead of 0.141, t_shape with 4 0.031 instead of 0.026, at 1.5 times the time.
 
 use crate::{crossing::Casts, pair_table::PairTable, plane::PlacedPlane, smoothing::smoothed};
 

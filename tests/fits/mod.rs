@@ -51,7 +51,6 @@ pub fn least() -> Effort {
         scoring: SampleSize { lights: 128, pairs: 30_000 },
         texels: 48,
         refine_steps: 4,
-        replace_rounds: 0,
         ..whole.search
     };
     let trace = TraceOptions { pairs: 600_000, lights: 384, stride: 4, exposure_rays: 16, seed: 0 };
