@@ -3,15 +3,16 @@
 use crate::shapes::{Case, Triangles, moved, reversed, triangles_of};
 use glam::DVec3;
 use serde_json::json;
+use shadowfit::effort::Effort;
 
 /// The solver works in unit space, so a placed model meets the same numbers but for rounding; a last bit can turn a
 /// near tie between two candidate planes. Planes of nearly the same gain leave nearly the same error: another seed
-/// moves that of the T by up to this.
+/// moves that of the T by up to this (preset fast, seeds 1 to 6: 0.024 to 0.032; the least effort: 0.05 to 0.12).
 const OTHER_CHOICE: f64 = 0.02;
 
 /// Fits the T as it is and as each case has it, and compares.
 fn assert_as_good(cases: &[(&str, Case, f64)]) {
-    let (plain, _) = Case::new(triangles_of("t_shape.glb")).fit();
+    let (plain, _) = careful(triangles_of("t_shape.glb")).fit();
     let plain_error = plain.held_out.shadow_error;
     // Otherwise an error of any size would pass below.
     assert!(plain_error < 0.1, "the plain model: {plain}");
@@ -25,13 +26,18 @@ fn assert_as_good(cases: &[(&str, Case, f64)]) {
     }
 }
 
+/// A case that luck has little part in.
+fn careful(triangles: Triangles) -> Case {
+    Case { effort: Effort::fast(), ..Case::new(triangles) }
+}
+
 fn placed(node: serde_json::Value) -> Case {
-    Case { node, ..Case::new(triangles_of("t_shape.glb")) }
+    Case { node, ..careful(triangles_of("t_shape.glb")) }
 }
 
 fn with_corners(to: impl Fn(DVec3) -> DVec3) -> Case {
     let triangles: Triangles = triangles_of("t_shape.glb");
-    Case::new(moved(&triangles, to))
+    careful(moved(&triangles, to))
 }
 
 #[test]
@@ -63,7 +69,7 @@ fn mirrored() {
         // The corners of a mirrored mesh run the other way round: unless that is undone, the T is inside out.
         (
             "corners mirrored",
-            Case::new(reversed(&moved(&triangles_of("t_shape.glb"), |p| DVec3::new(-p.x, p.y, p.z)))),
+            careful(reversed(&moved(&triangles_of("t_shape.glb"), |p| DVec3::new(-p.x, p.y, p.z)))),
             OTHER_CHOICE,
         ),
     ]);

@@ -6,7 +6,7 @@ use crate::{
 };
 use glam::DVec3;
 use serde_json::{Value, json};
-use shadowfit::{asset::ShadowSet, pipeline::FitError, report::Report, scene};
+use shadowfit::{asset::ShadowSet, effort::Effort, pipeline::FitError, report::Report, scene};
 use shadowfit_solver::lights::LightDomain;
 use std::fs;
 
@@ -23,12 +23,14 @@ pub struct Case {
     pub max_planes: Option<usize>,
     /// `--planes`: the text of the file.
     pub planes: Option<String>,
+    pub effort: Effort,
 }
 
 impl Case {
     pub fn new(triangles: Triangles) -> Self {
         let node = json!({});
-        Self { triangles, double_sided: false, node, lights: LightDomain::Sphere, max_planes: None, planes: None }
+        let (lights, effort) = (LightDomain::Sphere, fits::least());
+        Self { triangles, double_sided: false, node, lights, max_planes: None, planes: None, effort }
     }
 
     pub fn double_sided(self) -> Self {
@@ -57,12 +59,11 @@ impl Case {
         model.glb()
     }
 
-    /// Fits it with little effort.
     pub fn try_fit(&self) -> Result<(Report, ShadowSet), FitError> {
         let folder = tempfile::tempdir().unwrap();
         let input = folder.path().join("case.glb");
         fs::write(&input, self.glb()).unwrap();
-        let mut request = fits::request(&input, &folder.path().join("out"), fits::least());
+        let mut request = fits::request(&input, &folder.path().join("out"), self.effort);
         (request.domain, request.max_planes) = (self.lights, self.max_planes);
         request.planes = self.planes.as_ref().map(|text| {
             let path = folder.path().join("planes.json");
