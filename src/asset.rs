@@ -26,7 +26,7 @@ mod write;
 
 pub use atlas::Channel;
 pub use extension::{ActiveEntry, Extension, PlaneEntry, PlaneSet, TextureRef};
-pub use read::{ModelRectangle, read, read_plane_file};
+pub use read::{MAX_FILE_PLANES, ModelRectangle, read, read_plane_file};
 pub use write::{AssetRequest, Written, WrittenAtlas, check_input, check_outputs, write};
 
 pub use crate::gltf_file::EXTENSION;

@@ -290,19 +290,26 @@ struct PlaneFileEntry {
     side: Side,
 }
 
+/// Most planes of a `--planes` file: they make one section, and a fit counts in one byte how many cover a pair.
+pub const MAX_FILE_PLANES: usize = 255;
+
 /// Reads the rectangles of a `--planes` file: `{"comment": "..", "planes": [{"name": "..", "origin": [x, y, z],
 /// "uAxis": [..], "vAxis": [..], "side": "both|front|back"}]}`, model space, metres. `comment`, `name` and `side`
 /// may be left out.
 ///
 /// # Errors
-/// The file cannot be read; an unknown member; axes that are parallel.
+/// The file cannot be read; an unknown member; axes that are parallel; more than [`MAX_FILE_PLANES`] planes.
 pub fn read_plane_file(path: &Path) -> Result<Vec<ModelRectangle>, AssetError> {
     let bytes = files::read(path)?;
     let file = GltfFile::new(path, &bytes).map_err(|fault| AssetError::invalid(path, fault))?;
     let root = At::root(path, file.root());
     // The outer object is checked for unknown members; the planes one by one, so that each is named.
     let _: PlaneFile = root.parse()?;
-    let list = root.member("planes")?.elements()?;
+    let planes = root.member("planes")?;
+    let list = planes.elements()?;
+    if list.len() > MAX_FILE_PLANES {
+        return Err(planes.error(format!("{} planes; {MAX_FILE_PLANES} at most make one section", list.len())));
+    }
     let mut rectangles = Vec::with_capacity(list.len());
     for at in list {
         let PlaneFileEntry { name, origin, u_axis, v_axis, side } = at.parse()?;

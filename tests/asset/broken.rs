@@ -214,6 +214,10 @@ fn plane_files_are_checked_word_by_word() {
         ("\"planes\"", "\"sets\"", "unknown field `sets`"),
         ("[1e5,0,0]", "[1e999,0,0]", "number out of range"),
     ];
+    let many = vec![r#"{"origin":[0,0,0],"uAxis":[1,0,0],"vAxis":[0,0,1]}"#; 256].join(",");
+    let error =
+        read_plane_file(&folders.input("many.json", format!(r#"{{"planes":[{many}]}}"#).as_bytes())).unwrap_err();
+    assert!(error.to_string().contains("256 planes; 255 at most"), "{error}");
     for (from, to, expected) in cases {
         let path = folders.input("planes.json", good.replacen(from, to, 1).as_bytes());
         let error = read_plane_file(&path).unwrap_err();
