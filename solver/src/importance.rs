@@ -9,7 +9,7 @@
 //! the sums towards what made them stop.
 //!
 //! Not guaranteed: that a shadow smaller than a stratum is seen by the pilot. One of n candidates is then still drawn
-//! at the least rate r, and missed with probability (1-r)^n; r is [`FLOOR`] of the largest rate.
+//! at the least rate r, and missed with probability (1-r)^n; r is `FLOOR` of the largest rate.
 //!
 //! Held-out error and user seconds of the whole fit, 14 million pairs, 96 sections, seed 7, one run each: teapot_three
 //! uniform 0.0564, 52 s; so 0.0449, 55 s (an earlier draw of the same rates 0.0429: what follows differs by hardly
