@@ -52,7 +52,7 @@ struct FitArgs {
     #[arg(long, value_name = "M", value_parser = clap::value_parser!(u16).range(1..=64))]
     max_lookups: Option<u16>,
     /// Sections that the surface is divided into [default: 1 where a few planes explain all shadow or --max-planes is
-    /// given alone; else by preset, 48 (fast), 96 or 160 (best)].
+    /// given alone; else by preset, 48 (fast), 96 or 160 (best), half as many again where the model is mirrored].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     sections: Option<u16>,
     /// Most bytes of all occluder textures; K, M for KiB, MiB [default: 2M].
@@ -61,15 +61,8 @@ struct FitArgs {
     /// Find the fewest planes whose held-out shadow_error is at most this; exit code 6 where that fails.
     #[arg(long, value_name = "E", value_parser = error_share, conflicts_with_all = ["sections", "max_lookups"])]
     max_error: Option<f64>,
-    /// Texels along the longer side of each plane [default: 128].
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(8..=256))]
-    texture_size: Option<u16>,
-    /// Light directions to serve: sphere, hemisphere, or cone:AZIMUTH,ELEVATION,HALF_ANGLE in degrees.
-    #[arg(long, value_name = "DOMAIN", default_value = "sphere")]
-    lights: String,
-    /// How much work to do.
-    #[arg(long, value_enum, default_value_t = Preset::Balanced)]
-    preset: Preset,
+    #[command(flatten)]
+    method: MethodArgs,
     /// Bake the rectangles of this JSON file instead of searching.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["max_planes", "max_error", "sections"])]
     planes: Option<PathBuf>,
@@ -80,15 +73,29 @@ struct FitArgs {
     /// The model is left whole.
     #[arg(long, conflicts_with = "max_lookups")]
     certificate: bool,
+    /// Print the report as one JSON object instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What every search is told.
+#[derive(Debug, Args)]
+struct MethodArgs {
+    /// Texels along the longer side of each plane at most [default: 128].
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(8..=256))]
+    texture_size: Option<u16>,
+    /// Light directions to serve: sphere, hemisphere, or cone:AZIMUTH,ELEVATION,HALF_ANGLE in degrees.
+    #[arg(long, value_name = "DOMAIN", default_value = "sphere")]
+    lights: String,
+    /// How much work to do.
+    #[arg(long, value_enum, default_value_t = Preset::Balanced)]
+    preset: Preset,
     /// Seed of all sampling: the same seed gives the same bytes.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Threads [default: one a core]. The result does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Print the report as one JSON object instead of the table.
-    #[arg(long)]
-    json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -108,21 +115,8 @@ struct AblateArgs {
     /// explain all shadow]; 1 measures whole models only.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     sections: Option<u16>,
-    /// Texels along the longer side of each plane at most [default: 128].
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(8..=256))]
-    texture_size: Option<u16>,
-    /// Light directions to serve: sphere, hemisphere, or cone:AZIMUTH,ELEVATION,HALF_ANGLE in degrees.
-    #[arg(long, value_name = "DOMAIN", default_value = "sphere")]
-    lights: String,
-    /// How much work to do.
-    #[arg(long, value_enum, default_value_t = Preset::Balanced)]
-    preset: Preset,
-    /// Seed of all sampling.
-    #[arg(long, value_name = "S", default_value_t = 1)]
-    seed: u64,
-    /// Threads [default: one a core]. Only the seconds depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
+    #[command(flatten)]
+    method: MethodArgs,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -263,20 +257,20 @@ fn set_threads(threads: Option<u16>) -> Result<(), CliError> {
 }
 
 fn fit(args: FitArgs, command: String) -> Result<(), CliError> {
-    let domain = light_domain(&args.lights)?;
-    set_threads(args.threads)?;
+    let domain = light_domain(&args.method.lights)?;
+    set_threads(args.method.threads)?;
     let request = FitRequest {
         model: args.model,
         out_dir: args.out,
-        effort: args.preset.effort(),
+        effort: args.method.preset.effort(),
         max_planes: args.max_planes.map(usize::from),
         max_lookups: args.max_lookups.map(usize::from),
         sections: args.sections.map(usize::from),
         texture_budget: args.texture_budget,
         max_error: args.max_error,
-        texture_size: args.texture_size.map(usize::from),
+        texture_size: args.method.texture_size.map(usize::from),
         domain,
-        domain_text: args.lights,
+        domain_text: args.method.lights,
         planes: args.planes,
         validation: match args.validate {
             Validate::None => None,
@@ -284,7 +278,7 @@ fn fit(args: FitArgs, command: String) -> Result<(), CliError> {
             Validate::Full => Some(ValidationOptions::full()),
         },
         certificate: args.certificate.then(ColumnOptions::default),
-        seed: args.seed,
+        seed: args.method.seed,
         command,
     };
     let bar = progress_bar();
@@ -307,24 +301,24 @@ fn fit(args: FitArgs, command: String) -> Result<(), CliError> {
 
 /// Measures all methods and prints the table.
 fn ablate(args: AblateArgs, command: String) -> Result<(), CliError> {
-    let domain = light_domain(&args.lights)?;
-    set_threads(args.threads)?;
+    let domain = light_domain(&args.method.lights)?;
+    set_threads(args.method.threads)?;
     let request = FitRequest {
         model: args.model,
         out_dir: args.out,
-        effort: args.preset.effort(),
+        effort: args.method.preset.effort(),
         max_planes: Some(usize::from(args.max_planes)),
         max_lookups: None,
         sections: args.sections.map(usize::from),
         texture_budget: None,
         certificate: None,
         max_error: None,
-        texture_size: args.texture_size.map(usize::from),
+        texture_size: args.method.texture_size.map(usize::from),
         domain,
-        domain_text: args.lights,
+        domain_text: args.method.lights,
         planes: args.planes,
         validation: None,
-        seed: args.seed,
+        seed: args.method.seed,
         command,
     };
     let bar = progress_bar();
