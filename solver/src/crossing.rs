@@ -13,6 +13,7 @@ use crate::{
 };
 use glam::Vec3;
 use pulp::{Arch, Simd, WithSimd};
+use std::array::from_fn;
 
 type Lane = [f32; LANES];
 
@@ -79,7 +80,8 @@ impl Casts {
         }
         let LightRows { start, end, .. } = table.lights[light];
         let [(x, _), (y, _), (z, _)] = [&table.x, &table.y, &table.z].map(|column| column[start..end].as_chunks());
-        let [a, b, s] = lanes.rows.map(|row| row.map(|lane| lane[i]));
+        // By index: `map` would copy the rows of all sixteen lights.
+        let [a, b, s]: [[f32; 4]; 3] = from_fn(|row| from_fn(|c| lanes.rows[row][c][i]));
         let outside = (self.width * self.height) as u32;
         let (width, height) = (self.width as f32, self.height as f32);
         let texel = Texel { a, b, s, bias: self.bias, width, height, outside };
@@ -154,7 +156,7 @@ impl LanesOf {
             for (k, (dual, dual_dot_o)) in duals.into_iter().zip([origin[1], origin[2]]).enumerate() {
                 let along = l.dot(dual);
                 let start = [dual.x, dual.y, dual.z, -dual_dot_o];
-                let row = std::array::from_fn(
+                let row = from_fn(
                     #[inline(always)]
                     |c| start[c] + s[c] * along,
                 );
