@@ -16,7 +16,7 @@ use shadowfit_solver::{
     budget::{BudgetOptions, Sizing},
     certificate::Certificate,
     columns::{ColumnOptions, certify_found},
-    fit::{bake, bake_within},
+    fit::{Baker, bake},
     halves,
     lists::{ListOptions, SectionFit, assign},
     mesh::Mesh,
@@ -323,18 +323,20 @@ impl Fit<'_> {
             .zip(searched)
             .map(|(table, planes)| assign(table, planes, &self.plan.lists))
             .collect();
-        let share_of_budget = |share: f64| {
-            let bytes = (self.plan.budget.bytes as f64 * share) as usize;
-            BudgetOptions { bytes, ..self.plan.budget }
-        };
-        let divided = self.tables.len() > 1;
-        let shares = PACKED_SHARES.into_iter().chain(CURVE_BUDGETS.into_iter().filter(|_| divided));
-        let budgets: Vec<BudgetOptions> = shares.map(share_of_budget).collect();
-        let mut sets = bake_within(&fits, &self.directions, self.shadow, &budgets);
-        smaller.extend(sets.drain(PACKED_SHARES.len()..).rev().map(|set| (set, 0.0)));
-        let fits_budget = |set: &BakedSet| packed_bytes(set) <= self.plan.budget.bytes as u64;
-        let last = sets.len() - 1;
-        let set = sets.swap_remove(sets.iter().position(fits_budget).unwrap_or(last));
+        let budget = &self.plan.budget;
+        let baker = Baker::new(&fits, &self.directions, self.shadow, budget);
+        let within = |share: &f64| baker.within((budget.bytes as f64 * share) as usize);
+        if self.tables.len() > 1 {
+            smaller.extend(CURVE_BUDGETS.iter().rev().map(|share| (within(share), 0.0)));
+        }
+        let [largest, others @ ..] = &PACKED_SHARES;
+        let mut set = within(largest);
+        for share in others {
+            if packed_bytes(&set) <= budget.bytes as u64 {
+                break;
+            }
+            set = within(share);
+        }
         (set, smaller)
     }
 }

@@ -16,25 +16,34 @@ use rayon::prelude::*;
 /// lists.
 #[must_use]
 pub fn bake(fits: &[SectionFit], directions: &[Vec3], shadow_weight: f64, options: &BudgetOptions) -> BakedSet {
-    bake_within(fits, directions, shadow_weight, &[*options]).remove(0)
+    Baker::new(fits, directions, shadow_weight, options).within(options.bytes)
 }
 
-/// The same for several budgets that differ in their bytes only.
-#[must_use]
-pub fn bake_within(
-    fits: &[SectionFit],
-    directions: &[Vec3],
+/// What planes are worth at each size, for bakes within several budgets.
+pub struct Baker<'a> {
+    fits: &'a [SectionFit],
+    planes: Vec<&'a VotedPlane>,
+    offers: Offers,
+    directions: &'a [Vec3],
     shadow_weight: f64,
-    options: &[BudgetOptions],
-) -> Vec<BakedSet> {
-    let Some(first) = options.first() else { return Vec::new() };
-    let planes: Vec<&VotedPlane> = fits.iter().flat_map(|fit| &fit.planes).collect();
-    let offers = Offers::new(&planes, first);
-    let bake = |options: &BudgetOptions| {
-        let allocation = allocate(&offers, shadow_weight, options);
-        bake_sizes(fits, &planes, &allocation, (directions, options.smoothing))
-    };
-    options.iter().map(bake).collect()
+    options: BudgetOptions,
+}
+
+impl<'a> Baker<'a> {
+    /// Measures the planes, which takes the most of a bake. As [`bake`], but for the bytes.
+    #[must_use]
+    pub fn new(fits: &'a [SectionFit], directions: &'a [Vec3], shadow_weight: f64, options: &BudgetOptions) -> Self {
+        let planes: Vec<&VotedPlane> = fits.iter().flat_map(|fit| &fit.planes).collect();
+        let offers = Offers::new(&planes, options);
+        Self { fits, planes, offers, directions, shadow_weight, options: *options }
+    }
+
+    /// Bakes within so many bytes.
+    #[must_use]
+    pub fn within(&self, bytes: usize) -> BakedSet {
+        let allocation = allocate(&self.offers, self.shadow_weight, &BudgetOptions { bytes, ..self.options });
+        bake_sizes(self.fits, &self.planes, &allocation, (self.directions, self.options.smoothing))
+    }
 }
 
 /// Bakes planes to textures of given sizes.
