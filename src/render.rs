@@ -15,6 +15,7 @@ mod layout;
 mod pipelines;
 pub mod turntable;
 mod upload;
+pub mod volume;
 
 pub use camera::Camera;
 use glam::Vec3;

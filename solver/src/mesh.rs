@@ -259,6 +259,36 @@ impl Mesh {
         )
     }
 
+    /// The share of the light, per colour, that reaches `origin` (see [`ray_origin`]) from `distance` along `direction`
+    /// (unit): the product of `transmittance`, 0 to 1, over all surfaces in between, in any order. Infinitely far for a
+    /// directional light. A ray exactly through an edge that two triangles share meets both.
+    #[must_use]
+    pub fn transmitted(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        distance: f32,
+        transmittance: impl Fn(u32) -> Vec3,
+    ) -> Vec3 {
+        let watertight = WatertightRay::new(origin, direction);
+        let mut product = Vec3::ONE;
+        any_hit(
+            &self.bvh,
+            &bvh_ray(origin, direction),
+            #[inline(always)]
+            |i| {
+                if let Some((t, barycentric)) = watertight.intersect(&self.corners[i as usize])
+                    && t < distance
+                    && self.is_solid(i, barycentric)
+                {
+                    product *= transmittance(i);
+                }
+                product == Vec3::ZERO
+            },
+        );
+        product
+    }
+
     /// The nearest surface from `origin` in direction `direction` (unit). `drawn` says whether a triangle counts
     /// when seen from its front (true) or back (false).
     #[must_use]
