@@ -171,7 +171,7 @@ fn srgb_from_linear(x: f32) -> u8 {
 }
 
 /// Linear value 0..1 of an sRGB byte.
-fn linear_from_srgb(byte: u8) -> f32 {
+pub(crate) fn linear_from_srgb(byte: u8) -> f32 {
     let x = f32::from(byte) / 255.0;
     if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }

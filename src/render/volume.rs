@@ -44,7 +44,9 @@ struct Edge {
 struct Use {
     triangle: u32,
     class: u32,
-    /// 1 where the triangle runs from the edge's start to its end, else -1.
+    /// From its corner number `k` to the next.
+    k: u32,
+    /// 1 where that is from the edge's start to its end, else -1.
     along: i32,
 }
 
@@ -63,12 +65,10 @@ pub struct Volume {
 /// An edge to extrude: the quad (end, start, extruded start, extruded end) faces outwards, `count` times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Side {
-    /// A corner: `3 triangle + k`.
+    /// Corner `k` of a triangle of the class that casts: `3 triangle + k`.
     pub start: u32,
-    /// A corner.
+    /// Another corner of that triangle.
     pub end: u32,
-    /// Of the triangles that cast it.
-    pub class: u32,
     /// At least 1.
     pub count: u32,
 }
@@ -137,9 +137,11 @@ impl Casters {
             let end = self.edges.get(i + 1).map_or(self.uses.len(), |next| next.first_use);
             for uses in self.uses[edge.first_use..end].chunk_by(|a, b| a.class == b.class) {
                 let count: i32 = uses.iter().map(|u| u.along * facings[u.triangle as usize]).sum();
-                let [start, end] = if count > 0 { [edge.start, edge.end] } else { [edge.end, edge.start] };
+                let Use { triangle, k, along, .. } = uses[0];
+                let [from, to] = [k, (k + 1) % 3].map(|k| 3 * triangle + k);
+                let [start, end] = if along * count > 0 { [from, to] } else { [to, from] };
                 if count != 0 {
-                    volume.sides.push(Side { start, end, class: uses[0].class, count: count.unsigned_abs() });
+                    volume.sides.push(Side { start, end, count: count.unsigned_abs() });
                 }
             }
         }
@@ -172,10 +174,11 @@ impl Casters {
 
 /// The three edges of a triangle; those of no length are none.
 fn uses_of(((triangle, points), &class): ((u32, &[u32; 3]), &u32)) -> impl Iterator<Item = ([u32; 2], Use)> {
-    let [a, b, c] = *points;
-    [[a, b], [b, c], [c, a]].into_iter().filter(|[from, to]| from != to).map(move |[from, to]| {
+    let points = *points;
+    (0..3).filter_map(move |k| {
+        let [from, to] = [points[k], points[(k + 1) % 3]];
         let along = if from < to { 1 } else { -1 };
-        ([from.min(to), from.max(to)], Use { triangle, class, along })
+        (from != to).then_some(([from.min(to), from.max(to)], Use { triangle, class, k: k as u32, along }))
     })
 }
 

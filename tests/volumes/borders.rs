@@ -93,8 +93,9 @@ fn crossings(casters: &Casters, volume: &Volume, light: Vec4, (p, d): (DVec3, DV
     }
     for side in &volume.sides {
         let [a, b] = [side.start, side.end].map(corner);
-        faces.push(([b, a, extruded(a)], side.class, side.count as i32));
-        faces.push(([b, extruded(a), extruded(b)], side.class, side.count as i32));
+        let class = casters.class_of()[side.start as usize / 3];
+        faces.push(([b, a, extruded(a)], class, side.count as i32));
+        faces.push(([b, extruded(a), extruded(b)], class, side.count as i32));
     }
     let mut counts = BTreeMap::new();
     for (face, class, count) in faces {
