@@ -259,6 +259,23 @@ impl Mesh {
         )
     }
 
+    /// Does anything block the segment from `origin` (see [`ray_origin`]) to `end`?
+    #[must_use]
+    pub fn is_blocked_before(&self, origin: Vec3, end: Vec3) -> bool {
+        let distance = (end - origin).length();
+        let direction = (end - origin).normalize_or_zero();
+        let watertight = WatertightRay::new(origin, direction);
+        any_hit(
+            &self.bvh,
+            &bvh_ray(origin, direction),
+            #[inline(always)]
+            |i| {
+                let hit = watertight.intersect(&self.corners[i as usize]);
+                hit.is_some_and(|(t, barycentric)| t < distance && self.is_solid(i, barycentric))
+            },
+        )
+    }
+
     /// The share of the light, per colour, that reaches `origin` (see [`ray_origin`]) from `distance` along `direction`
     /// (unit): the product of `transmittance`, 0 to 1, over all surfaces in between, in any order. Infinitely far for a
     /// directional light. A ray exactly through an edge that two triangles share meets both.
@@ -342,7 +359,8 @@ fn frame_of(soup: &Soup) -> Result<Frame, MeshError> {
 
 /// The bits of the corners, starting at the smallest: equal for the same triangle in the same turn. Adding 0.0
 /// makes -0.0 and 0.0 one.
-fn turn_key(corners: &[Vec3; 3]) -> [[u32; 3]; 3] {
+#[must_use]
+pub fn turn_key(corners: &[Vec3; 3]) -> [[u32; 3]; 3] {
     let bits = corners.map(|p| (p + Vec3::ZERO).to_array().map(f32::to_bits));
     let first = (0..3).min_by_key(|&i| bits[i]).unwrap_or(0);
     [bits[first], bits[(first + 1) % 3], bits[(first + 2) % 3]]

@@ -18,8 +18,10 @@
 //!
 //! A light is one homogeneous point in unit space: (direction towards it, 0) or (position, 1).
 
+use crate::scene::Scene;
 use glam::{DVec3, Vec3, Vec4};
-use std::collections::HashMap;
+use shadowfit_solver::mesh::{Frame, turn_key};
+use std::collections::{HashMap, HashSet};
 
 /// The triangles that cast, and which edges they share.
 #[derive(Clone, Debug)]
@@ -74,6 +76,23 @@ pub struct Side {
 }
 
 impl Casters {
+    /// The casters of a scene in the unit space of `frame`: all triangles but the ground and copies of others. `class_of`
+    /// tells the class of a material. Also, of each caster, its triangle in the scene.
+    #[must_use]
+    pub fn of_scene(scene: &Scene, frame: &Frame, class_of: impl Fn(usize) -> u32) -> (Self, Vec<u32>) {
+        let mut seen = HashSet::new();
+        let (mut corners, mut classes, mut source) = (Vec::new(), Vec::new(), Vec::new());
+        for (triangle, corners_model) in scene.soup.corners_model.iter().enumerate() {
+            let corners_unit = corners_model.map(|p| frame.unit_from_model(p));
+            if !scene.is_ground(triangle) && seen.insert(turn_key(&corners_unit)) {
+                corners.push(corners_unit);
+                classes.push(class_of(scene.material_of[triangle] as usize));
+                source.push(triangle as u32);
+            }
+        }
+        (Self::new(&corners, &classes), source)
+    }
+
     /// Finds the edges. `class_of` has one entry a triangle.
     #[must_use]
     pub fn new(corners: &[[Vec3; 3]], class_of: &[u32]) -> Self {
