@@ -22,14 +22,17 @@ mod plane_view;
 pub mod ray_traced;
 pub mod shadow_map;
 pub mod stage;
+pub mod stencil_volumes;
 pub mod technique;
 pub mod timing;
 pub mod turntable;
 pub mod unshadowed;
 mod upload;
+pub mod volume;
+mod volume_pass;
 
 pub use camera::Camera;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 /// Share of the base colour that a surface shows without direct light.
 pub const AMBIENT: f32 = 0.25;
@@ -93,6 +96,15 @@ impl Light {
         match *self {
             Self::Directional { to_light } => to_light,
             Self::Point { position } => position - p_unit,
+        }
+    }
+
+    /// As a homogeneous point: (direction towards the light, 0), or (position, 1).
+    #[must_use]
+    pub fn homogeneous(&self) -> Vec4 {
+        match *self {
+            Self::Directional { to_light } => to_light.extend(0.0),
+            Self::Point { position } => position.extend(1.0),
         }
     }
 
@@ -190,7 +202,7 @@ fn srgb_from_linear(x: f32) -> u8 {
 }
 
 /// Linear value 0..1 of an sRGB byte.
-fn linear_from_srgb(byte: u8) -> f32 {
+pub(crate) fn linear_from_srgb(byte: u8) -> f32 {
     let x = f32::from(byte) / 255.0;
     if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }

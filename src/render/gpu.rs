@@ -54,8 +54,12 @@ pub const PLANE_RECTANGLES: Shader = Shader {
 pub const DEPTH: Shader = Shader { name: "depth", parts: parts!["frame.wgsl", "surface.wgsl", "depth.wgsl"] };
 /// The model with a shadow map.
 pub const SHADOW_MAP: Shader = forward!("shadow_map", "shadow_map.wgsl");
+/// Shadow volumes into the stencil.
+pub const STENCIL_VOLUMES: Shader =
+    Shader { name: "stencil_volumes", parts: parts!["frame.wgsl", "volumes.wgsl", "stencil_volumes.wgsl"] };
 /// All passes.
-pub const SHADERS: &[Shader] = &[CONSTANT_VISIBILITY, OCCLUDER_PLANES, PLANE_CUTS, PLANE_RECTANGLES, DEPTH, SHADOW_MAP];
+pub const SHADERS: &[Shader] =
+    &[CONSTANT_VISIBILITY, OCCLUDER_PLANES, PLANE_CUTS, PLANE_RECTANGLES, DEPTH, SHADOW_MAP, STENCIL_VOLUMES];
 
 /// Features that some technique uses, asked for where the adapter has them.
 const WANTED: wgpu::Features = wgpu::Features::DEPTH_CLIP_CONTROL

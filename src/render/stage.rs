@@ -194,18 +194,14 @@ impl Stage {
     /// Sends the frame's constants; every technique's passes read them.
     pub(super) fn send(&self, request: &FrameRequest) {
         let clip_from_world = request.camera.clip_from_world(request.options.size_px);
-        let vector = |light: Light| match light {
-            Light::Directional { to_light } => to_light.extend(0.0),
-            Light::Point { position } => position.extend(1.0),
-        };
         let frame =
-            FrameUniform { clip_from_world, light: vector(request.light), eye: request.camera.eye().extend(1.0) };
+            FrameUniform { clip_from_world, light: request.light.homogeneous(), eye: request.camera.eye().extend(1.0) };
         let instance = |placement: &Placement| {
             let world_from_unit = placement.world_from_unit();
             Instance {
                 clip_from_unit: clip_from_world * world_from_unit,
                 world_from_unit,
-                light: vector(placement.light_unit(&request.light)),
+                light: placement.light_unit(&request.light).homogeneous(),
             }
         };
         let instances: Vec<Instance> = self.placements.iter().map(instance).collect();

@@ -80,7 +80,8 @@ pub fn keep(picture: &image::RgbaImage, name: &str) {
 
 /// An empty scene with one white material.
 pub fn empty() -> Scene {
-    let white = Material { base_color: [1.0; 4], image: None, repeat: [false; 2], alpha_cutoff: None };
+    let white =
+        Material { base_color: [1.0; 4], image: None, repeat: [false; 2], alpha_cutoff: None, transmittance: None };
     Scene { materials: vec![white], ..Scene::default() }
 }
 
