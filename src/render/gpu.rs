@@ -53,13 +53,17 @@ pub const PLANE_RECTANGLES: Shader = Shader {
 /// The casters' depth from a light.
 pub const DEPTH: Shader = Shader { name: "depth", parts: parts!["frame.wgsl", "surface.wgsl", "depth.wgsl"] };
 /// The model with a shadow map.
-pub const SHADOW_MAP: Shader = forward!("shadow_map", "shadow_map.wgsl");
+pub const SHADOW_MAP: Shader = forward!("shadow_map", "light_views.wgsl", "shadow_map.wgsl");
 /// Shadow volumes into the stencil.
 pub const STENCIL_VOLUMES: Shader =
     Shader { name: "stencil_volumes", parts: parts!["frame.wgsl", "volumes.wgsl", "stencil_volumes.wgsl"] };
+/// Where the silhouette, as a light sees it, passes through the texels of a map.
+pub const SILHOUETTE_POINTS: Shader = Shader { name: "silhouette_points", parts: parts!["silhouette_points.wgsl"] };
+/// The model with a shadow silhouette map.
+pub const SILHOUETTE_MAP: Shader = forward!("silhouette_map", "light_views.wgsl", "silhouette_map.wgsl");
 /// All passes.
 pub const SHADERS: &[Shader] =
-    &[CONSTANT_VISIBILITY, OCCLUDER_PLANES, PLANE_CUTS, PLANE_RECTANGLES, DEPTH, SHADOW_MAP, STENCIL_VOLUMES];
+    &[CONSTANT_VISIBILITY, OCCLUDER_PLANES, PLANE_CUTS, PLANE_RECTANGLES, DEPTH, SHADOW_MAP, STENCIL_VOLUMES, SILHOUETTE_POINTS, SILHOUETTE_MAP];
 
 /// Features that some technique uses, asked for where the adapter has them.
 const WANTED: wgpu::Features = wgpu::Features::DEPTH_CLIP_CONTROL

@@ -57,6 +57,8 @@ pub struct Model {
     /// The corners of the casters that lie farthest in some of [`EXTREME_DIRECTIONS`] directions, unit space: what a
     /// light's view must hold.
     pub extremes: Vec<Vec3>,
+    /// The box of all triangles, the ground's too, unit space: least and greatest corner.
+    pub bounds: [Vec3; 2],
 }
 
 impl Model {
@@ -70,6 +72,7 @@ impl Model {
     ) -> Result<Self, RenderError> {
         let (vertices, looks) = vertices(scene, frame);
         let extremes = extremes(&vertices, &looks);
+        let bounds = vertices.iter().fold([Vec3::MAX, Vec3::MIN], |[low, high], v| [low.min(v.p), high.max(v.p)]);
         let bytes: &[u8] = bytemuck::cast_slice(&vertices);
         let limit = gpu.limits().max_buffer_size;
         if bytes.len() as u64 > limit {
@@ -94,7 +97,7 @@ impl Model {
             let Look { ground, double_sided, has_holes, .. } = look;
             batches.push(Batch { ground, double_sided, has_holes, bind_group, vertices: range });
         }
-        Ok(Self { vertices, batches, extremes })
+        Ok(Self { vertices, batches, extremes, bounds })
     }
 }
 
