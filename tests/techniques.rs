@@ -1,7 +1,13 @@
 //! Each technique against the traced reference on closed-form scenes, with the class of error that is expected of it.
 
+#[path = "techniques/planar.rs"]
+mod planar;
+#[path = "techniques/projective_texture.rs"]
+mod projective_texture;
 #[path = "techniques/shadow_map.rs"]
 mod shadow_map;
+#[path = "techniques/soft_planar.rs"]
+mod soft_planar;
 mod stages;
 #[path = "techniques/unshadowed.rs"]
 mod unshadowed;

@@ -74,6 +74,16 @@ pub(crate) enum Part {
     Ground,
 }
 
+impl Part {
+    fn holds(self, batch: &Batch) -> bool {
+        match self {
+            Self::All => true,
+            Self::Casters => !batch.ground,
+            Self::Ground => batch.ground,
+        }
+    }
+}
+
 /// The bind group layouts of all techniques: group 0 is the frame, group 1 a material; group 2 is the technique's own.
 #[derive(Clone, Debug)]
 pub(crate) struct Layouts {
@@ -139,14 +149,19 @@ impl Stage {
         &self.placements
     }
 
-    /// Draw calls of a pass over all casters.
+    /// Draw calls of a pass over everything.
     #[must_use]
     pub fn calls_per_pass(&self) -> usize {
+        self.calls_of(Part::All)
+    }
+
+    /// Draw calls of a pass over a part.
+    pub(crate) fn calls_of(&self, part: Part) -> usize {
         let calls = match self.draw_calls {
             DrawCalls::Instanced => 1,
             DrawCalls::OnePerInstance => self.placements.len(),
         };
-        calls * self.model.batches.len()
+        calls * self.model.batches.iter().filter(|batch| part.holds(batch)).count()
     }
 
     /// Draws a frame with what `technique` prepares for its light. Alpha is 255 everywhere but on the background of
@@ -194,18 +209,14 @@ impl Stage {
     /// Sends the frame's constants; every technique's passes read them.
     pub(super) fn send(&self, request: &FrameRequest) {
         let clip_from_world = request.camera.clip_from_world(request.options.size_px);
-        let vector = |light: Light| match light {
-            Light::Directional { to_light } => to_light.extend(0.0),
-            Light::Point { position } => position.extend(1.0),
-        };
         let frame =
-            FrameUniform { clip_from_world, light: vector(request.light), eye: request.camera.eye().extend(1.0) };
+            FrameUniform { clip_from_world, light: request.light.homogeneous(), eye: request.camera.eye().extend(1.0) };
         let instance = |placement: &Placement| {
             let world_from_unit = placement.world_from_unit();
             Instance {
                 clip_from_unit: clip_from_world * world_from_unit,
                 world_from_unit,
-                light: vector(placement.light_unit(&request.light)),
+                light: placement.light_unit(&request.light).homogeneous(),
             }
         };
         let instances: Vec<Instance> = self.placements.iter().map(instance).collect();
@@ -227,12 +238,7 @@ impl Stage {
         part: Part,
         pipeline: impl Fn(&Batch) -> &'p wgpu::RenderPipeline,
     ) {
-        let drawn = |batch: &&Batch| match part {
-            Part::All => true,
-            Part::Casters => !batch.ground,
-            Part::Ground => batch.ground,
-        };
-        for batch in self.model.batches.iter().filter(drawn) {
+        for batch in self.model.batches.iter().filter(|batch| part.holds(batch)) {
             pass.set_pipeline(pipeline(batch));
             pass.set_bind_group(1, &batch.bind_group, &[]);
             let count = self.placements.len() as u32;

@@ -7,6 +7,7 @@ use shadowfit::{
         Antialias, Camera, FrameOptions, FrameRequest, Light, Mode,
         gpu::Gpu,
         ray_traced::RayTraced,
+        receiver::Receiver,
         stage::{Placement, Stage},
         technique::Technique,
     },
@@ -45,6 +46,16 @@ impl Case {
         [traced, self.stage.render(technique, request).expect("drawn")]
     }
 
+    /// For each pixel: does the camera see the ground?
+    pub fn ground_seen(&self, request: &FrameRequest) -> Vec<bool> {
+        self.traced.ground_seen(&self.traced.look(request).expect("traced"))
+    }
+
+    /// The flat receiver that the ground is.
+    pub fn receiver(&self) -> Receiver {
+        Receiver::of_ground(self.traced.scene(), &WORLD).expect("a ground")
+    }
+
     /// Missed and false shadow, shares of the covered pixels. Keeps both masks for people.
     pub fn errors(&mut self, technique: &mut dyn Technique, request: &FrameRequest) -> [f64; 2] {
         let [traced, drawn] = self.masks(technique, request);
@@ -54,6 +65,29 @@ impl Case {
         assert!(errors.covered > 1000.0, "the camera sees next to nothing");
         [errors.share(errors.missed), errors.share(errors.false_)]
     }
+}
+
+/// Missed and false shadow, shares of the covered pixels of the ground.
+pub fn ground_errors([traced, drawn]: &[image::RgbaImage; 2], ground: &[bool]) -> [f64; 2] {
+    let errors = MaskErrors::where_seen(traced, drawn, |pixel| ground[pixel]);
+    assert!(errors.covered > 1000.0, "the camera sees next to no ground");
+    [errors.share(errors.missed), errors.share(errors.false_)]
+}
+
+/// Pixels of the ground that are wrong though no pixel around them differs from them in the traced mask: wrong not just
+/// because a border runs through them.
+pub fn wrong_off_borders([traced, drawn]: &[image::RgbaImage; 2], ground: &[bool]) -> usize {
+    let [width, height] = [traced.width(), traced.height()];
+    let around = |x: u32, y: u32| {
+        (y.saturating_sub(1)..(y + 2).min(height))
+            .flat_map(move |j| (x.saturating_sub(1)..(x + 2).min(width)).map(move |i| (i, j)))
+    };
+    let is_wrong = |&(x, y): &(u32, u32)| {
+        let here = traced.get_pixel(x, y);
+        here != drawn.get_pixel(x, y) && around(x, y).all(|(i, j)| traced.get_pixel(i, j) == here)
+    };
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    pixels.filter(|&(x, y)| ground[(y * width + x) as usize]).filter(is_wrong).count()
 }
 
 /// A mask from `eye`, looking at `target`.
@@ -116,6 +150,23 @@ pub fn push(scene: &mut Scene, corners: [Vec3; 3]) {
     scene.material_of.push(0);
     scene.section_of.push(0);
     scene.origins.push(shadowfit::scene::Origin { mesh: 0, primitive: 0, triangle: scene.origins.len() as u32 });
+}
+
+/// Adds a level ground from `low` to `high` (x, z) at height 0, behind all else: it receives and does not cast.
+pub fn ground(scene: &mut Scene, low: Vec2, high: Vec2) {
+    let corner = Vec3::new(low.x, 0.0, high.y);
+    quad(scene, corner, Vec3::X * (high.x - low.x), Vec3::NEG_Z * (high.y - low.y));
+    scene.ground_triangles = 2;
+}
+
+/// Level plates (centre, half side) over a ground of side 3.
+pub fn plates_over_ground(plates: &[(Vec3, f32)]) -> Scene {
+    let mut scene = empty();
+    for &(centre, half) in plates {
+        quad(&mut scene, centre + Vec3::new(-half, 0.0, half), Vec3::X * 2.0 * half, Vec3::NEG_Z * 2.0 * half);
+    }
+    ground(&mut scene, Vec2::splat(-1.5), Vec2::splat(1.5));
+    scene
 }
 
 /// A square plate of side 0.8 at height 0.5 over a ground of side 3 at height 0.
