@@ -25,7 +25,7 @@ use super::{
     stage::{Begin, Part, Stage, Targets},
     technique::{Cost, Technique},
 };
-use glam::{Mat4, Vec3, Vec4};
+use glam::{Mat4, Vec3};
 
 /// Half floats: blended and filtered everywhere, which single floats are not.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R16Float;
@@ -37,9 +37,10 @@ const MOST_SAMPLES: u64 = 2048;
 pub struct SoftPlanarOptions {
     /// Where shadow falls: the scene's ground lies in it.
     pub receiver: Receiver,
-    /// Half the edges of a parallelogram around a point light. A directional light has them at distance 1: their
-    /// lengths are tangents of half its angular sizes.
+    /// Half the edges of the parallelogram that a point light stands for.
     pub half_edges: [Vec3; 2],
+    /// Half the angle under which a directional light is seen ([`AreaLight::distant`]).
+    pub half_angle_rad: f32,
     /// Samples along each edge of the light, 1 (hard) to 45: penumbrae get smoother, a new light's cost grows with the
     /// square.
     pub side: u32,
@@ -106,11 +107,14 @@ impl SoftPlanar {
         Ok(technique)
     }
 
-    /// The samples of a light, homogeneous.
-    fn samples(&self, light: &Light) -> Vec<Vec4> {
-        let middle = light.homogeneous();
-        let area = AreaLight { centre: middle.truncate(), half_edges: self.options.half_edges };
-        area.samples(self.options.side as usize).into_iter().map(|p| p.extend(middle.w)).collect()
+    /// The samples of a light.
+    fn samples(&self, light: &Light) -> Vec<Vec3> {
+        let SoftPlanarOptions { half_edges, half_angle_rad, side, .. } = self.options;
+        let area = match *light {
+            Light::Directional { to_light } => AreaLight::distant(to_light, half_angle_rad),
+            Light::Point { position: centre } => AreaLight { centre, half_edges },
+        };
+        area.samples(side as usize)
     }
 }
 
@@ -150,15 +154,18 @@ impl Technique for SoftPlanar {
         let samples = self.samples(&request.light);
         let plane = receiver.facing(request.light.homogeneous());
         // The receiver sees the samples on the side of the light's middle; the others are behind it.
-        let above = |sample: &Vec4| plane.filter(|plane| plane.dot(*sample) > 0.0).map(|plane| (plane, *sample));
-        let seen: Vec<(Vec4, Vec4)> = samples.iter().filter_map(above).collect();
+        let above = |sample: &Vec3| {
+            let sample = sample.extend(1.0);
+            plane.filter(|plane| plane.dot(sample) > 0.0).map(|plane| receiver.clip_from_world(plane, sample))
+        };
+        let seen: Vec<Mat4> = samples.iter().filter_map(above).collect();
         let behind = samples.len() - seen.len();
         let side = self.options.size_texels as f32;
         let mut pass = begin(encoder, &self.blocked.faces[0], behind as f64, Some(&self.depth.faces[0]));
-        for (number, &(plane, sample)) in seen.iter().enumerate() {
+        for (number, &clip_from_world) in seen.iter().enumerate() {
             let depth = 1.0 - (number + 1) as f32 / (samples.len() + 1) as f32;
             pass.set_viewport(0.0, 0.0, side, side, depth, depth);
-            self.silhouette.draw(stage, (number, receiver.clip_from_world(plane, sample)), &mut pass);
+            self.silhouette.draw(stage, (number, clip_from_world), &mut pass);
         }
         Ok(())
     }

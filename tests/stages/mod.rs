@@ -13,7 +13,7 @@ use shadowfit::{
     },
     scene::{Material, Scene},
 };
-use shadowfit_solver::mesh::{Frame, Sides};
+use shadowfit_solver::mesh::{Frame, Mesh, Sides};
 use std::sync::LazyLock;
 
 pub const SIZE_PX: [u32; 2] = [256, 256];
@@ -31,12 +31,26 @@ pub fn gpu() -> &'static Gpu {
 pub struct Case {
     pub stage: Stage,
     pub traced: RayTraced,
+    world: Frame,
 }
 
 impl Case {
     pub fn new(scene: Scene) -> Self {
-        let stage = Stage::new(gpu(), &scene, &WORLD, &[Placement::IDENTITY]).expect("the scene fits");
-        Self { stage, traced: RayTraced::new(scene, &WORLD).expect("a model") }
+        Self::in_world(scene, WORLD)
+    }
+
+    /// A committed model on a ground of half extent 2; world space is the model's unit space.
+    pub fn on_ground(model: &str) -> Self {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("models").join(model);
+        let mut scene = shadowfit::scene::load(&path).expect("a model");
+        let world = Mesh::new(&scene.soup).expect("triangles").frame;
+        scene.stand_on_ground(&world, 2.0);
+        Self::in_world(scene, world)
+    }
+
+    fn in_world(scene: Scene, world: Frame) -> Self {
+        let stage = Stage::new(gpu(), &scene, &world, &[Placement::IDENTITY]).expect("the scene fits");
+        Self { stage, traced: RayTraced::new(scene, &world).expect("a model"), world }
     }
 
     /// The traced mask and the drawn one.
@@ -53,7 +67,7 @@ impl Case {
 
     /// The flat receiver that the ground is.
     pub fn receiver(&self) -> Receiver {
-        Receiver::of_ground(self.traced.scene(), &WORLD).expect("a ground")
+        Receiver::of_ground(self.traced.scene(), &self.world).expect("a ground")
     }
 
     /// Missed and false shadow, shares of the covered pixels. Keeps both masks for people.

@@ -2,13 +2,19 @@
 //! the casters themselves.
 
 use crate::stages::{
-    Case, directional, empty, ground, ground_errors, keep, mask, plates_over_ground, quad, wrong_off_borders,
+    Case, WORLD, directional, empty, gpu, ground, ground_errors, keep, mask, plates_over_ground, quad,
+    wrong_off_borders,
 };
-use glam::{Vec2, Vec3};
+use glam::{Quat, Vec2, Vec3};
 use shadowfit::{
+    masks::MaskErrors,
     render::{
         Antialias, FrameRequest, Light, Mode,
         planar::{Planar, PlanarOptions},
+        projective_texture::{ProjectiveTexture, ProjectiveTextureOptions},
+        receiver::Receiver,
+        soft_planar::{SoftPlanar, SoftPlanarOptions},
+        stage::{DrawCalls, Placement, Stage},
         technique::Technique,
         unshadowed::Unshadowed,
     },
@@ -69,7 +75,7 @@ fn casters_keep_their_light_where_they_shadow_each_other() {
 #[test]
 fn overlapping_shadows_are_no_darker() {
     let mut case = Case::new(plates_over_ground(&[(Vec3::new(-0.1, 0.3, 0.0), 0.3), (Vec3::new(0.1, 0.6, 0.0), 0.3)]));
-    let mut request = mask(EYE, Vec3::ZERO, directional(0.1, 1.0, 0.3));
+    let mut request = mask(EYE, Vec3::ZERO, directional(-0.7, 1.0, -0.6));
     let ground = case.ground_seen(&request);
     request.options.mode = Mode::Shaded;
     let picture = case.stage.render(&mut planar(&case), &request).expect("drawn");
@@ -141,6 +147,62 @@ fn casters_below_the_plane_cast_nothing_on_it() {
         for light in [directional(0.2, 1.0, -0.5), point(0.2, 1.5, -0.8)] {
             let (wrong, blocked) = wrong_and_blocked(&mut case, &mask(EYE, Vec3::ZERO, light), name);
             assert!(wrong == 0 && (blocked > 0.005) == blocks, "{name}, {light:?}: {wrong} wrong, {blocked} in shadow");
+        }
+    }
+}
+
+#[test]
+fn a_model_stands_in_its_shadow() {
+    let mut case = Case::on_ground("teapot.glb");
+    let mut request = mask(Vec3::new(1.2, 2.0, 3.0), Vec3::ZERO, directional(-0.8, 1.0, -0.3));
+    let (wrong, blocked) = wrong_and_blocked(&mut case, &request, "teapot");
+    assert!(wrong == 0 && blocked > 0.01, "{wrong} {blocked}");
+    request.options.mode = Mode::Shaded;
+    keep(&case.stage.render(&mut planar(&case), &request).expect("drawn"), "planar teapot shaded.png");
+}
+
+/// The three techniques that know a ground alone, on the plane y = 0 from (-3, -1.5) to (3, 1.5).
+fn on_wide_ground(stage: &Stage) -> [Box<dyn Technique>; 3] {
+    let receiver = Receiver::new(Vec3::new(-3.0, 0.0, 1.5), [Vec3::X * 6.0, Vec3::NEG_Z * 3.0]).expect("an area");
+    let half_edges = [Vec3::X * 0.2, Vec3::Z * 0.2];
+    let soft = SoftPlanarOptions { receiver, half_edges, half_angle_rad: 0.1, side: 3, size_texels: 512 };
+    let projective = ProjectiveTexture::new(stage, ProjectiveTextureOptions { size_texels: 512 });
+    [
+        Box::new(Planar::new(stage, PlanarOptions { receiver })),
+        Box::new(projective.expect("it fits")),
+        Box::new(SoftPlanar::new(stage, soft).expect("it fits")),
+    ]
+}
+
+#[test]
+fn instances_cast_onto_the_ground_of_each_other() {
+    // Two tiles side by side, the right one turned, draw what one scene of both draws.
+    let quarter = Quat::from_rotation_y(std::f32::consts::FRAC_PI_2);
+    let plate = Vec3::new(-0.3, 0.9, 0.2);
+    let place = |x: f32, rotation: Quat| Placement { rotation, scale: 1.0, translation: Vec3::X * x };
+    let placements = [place(-1.5, Quat::IDENTITY), place(1.5, quarter)];
+    let mut tiles =
+        Stage::new(gpu(), &plates_over_ground(&[(plate, 0.3)]), &WORLD, &placements).expect("the scene fits");
+    let mut both = empty();
+    for placement in placements {
+        let centre = placement.world_from_unit().transform_point3(plate);
+        quad(&mut both, centre + Vec3::new(-0.3, 0.0, 0.3), Vec3::X * 0.6, Vec3::Z * -0.6);
+    }
+    ground(&mut both, Vec2::new(-3.0, -1.5), Vec2::new(3.0, 1.5));
+    let mut whole = Case::new(both);
+    for light in [directional(1.0, 0.6, 0.1), point(0.4, 2.0, 0.3)] {
+        let request = mask(Vec3::new(0.0, 5.0, 3.0), Vec3::ZERO, light);
+        for (number, mut technique) in on_wide_ground(&whole.stage).into_iter().enumerate() {
+            let expected = whole.stage.render(&mut *technique, &request).expect("drawn");
+            for draw_calls in [DrawCalls::Instanced, DrawCalls::OnePerInstance] {
+                tiles.draw_calls = draw_calls;
+                let drawn = tiles.render(&mut *on_wide_ground(&tiles)[number], &request).expect("drawn");
+                keep(&drawn, &format!("instances, {}.png", technique.name()));
+                let errors = MaskErrors::between(&expected, &drawn);
+                let dark = expected.pixels().filter(|p| p.0[1] == 255 && p.0[0] < 128).count() as f64;
+                // A matrix of an instance rounds otherwise.
+                assert!(errors.wrong() < 0.01 * dark && dark > 500.0, "{}: {errors:?} {dark}", technique.name());
+            }
         }
     }
 }
