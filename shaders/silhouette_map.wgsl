@@ -28,8 +28,12 @@ fn silhouette_point(texel: vec2i, face: u32) -> vec2f {
     return vec2f(texel) + textureLoad(points, clamp(texel, vec2i(0), last), face, 0).xy;
 }
 
-fn is_lit(texel: vec2i, face: u32, depth: f32) -> bool {
-    return depth <= textureLoad(depth_map, texel, face, 0);
+// Does the light reach the fragment's plane there? None is nearer to the light, nor at the fragment.
+fn is_lit(texel: vec2i, view: InView, slope: vec2f) -> bool {
+    let at = (vec2f(texel) + 0.5) / vec2f(textureDimensions(depth_map));
+    // Receivers beyond the last caster are as far as can be.
+    let depth = clamp(view.depth + min(dot(slope, at - view.uv), 0.0), 0.0, 1.0);
+    return depth <= textureLoad(depth_map, texel, view.face, 0);
 }
 
 // Which of the texel's corners has its quadrant around p: it is bounded by the lines from the texel's point to the
@@ -55,12 +59,11 @@ fn predicted_visibility(surface: Surface) -> vec3f {
     let size = textureDimensions(depth_map).x;
     let p = view.uv * f32(size) - 0.5;
     let texel = clamp(vec2i(floor(p)), vec2i(0), vec2i(i32(size) - 2));
-    // Receivers beyond the last caster are as far as can be.
-    let depth = min(view.depth, 1.0);
+    let slope = plane_slope(surface, view);
     var lit: array<bool, 4>;
     var count = 0u;
     for (var i = 0u; i < 4u; i++) {
-        lit[i] = is_lit(texel + CORNERS[i], view.face, depth);
+        lit[i] = is_lit(texel + CORNERS[i], view, slope);
         count += u32(lit[i]);
     }
     if count == 0u || count == 4u {

@@ -6,6 +6,12 @@ mod perspective_shadow_map;
 mod shadow_map;
 #[path = "techniques/silhouette_map.rs"]
 mod silhouette_map;
+#[path = "techniques/planar.rs"]
+mod planar;
+#[path = "techniques/projective_texture.rs"]
+mod projective_texture;
+#[path = "techniques/soft_planar.rs"]
+mod soft_planar;
 mod stages;
 #[path = "techniques/unshadowed.rs"]
 mod unshadowed;

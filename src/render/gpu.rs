@@ -61,9 +61,31 @@ pub const STENCIL_VOLUMES: Shader =
 pub const SILHOUETTE_POINTS: Shader = Shader { name: "silhouette_points", parts: parts!["silhouette_points.wgsl"] };
 /// The model with a shadow silhouette map.
 pub const SILHOUETTE_MAP: Shader = forward!("silhouette_map", "light_views.wgsl", "silhouette_map.wgsl");
+/// The casters flattened onto a plane.
+pub const PLANAR: Shader = Shader { name: "planar", parts: parts!["frame.wgsl", "surface.wgsl", "planar.wgsl"] };
+/// Where the casters are, as a light sees them.
+pub const SILHOUETTE: Shader =
+    Shader { name: "silhouette", parts: parts!["frame.wgsl", "surface.wgsl", "depth.wgsl", "silhouette.wgsl"] };
+/// The ground with that silhouette projected onto it.
+pub const PROJECTIVE_TEXTURE: Shader = forward!("projective_texture", "light_views.wgsl", "projective_texture.wgsl");
+/// The ground with a soft shadow.
+pub const SOFT_PLANAR: Shader = forward!("soft_planar", "soft_planar.wgsl");
 /// All passes.
-pub const SHADERS: &[Shader] =
-    &[CONSTANT_VISIBILITY, OCCLUDER_PLANES, PLANE_CUTS, PLANE_RECTANGLES, DEPTH, SHADOW_MAP, STENCIL_VOLUMES, SILHOUETTE_POINTS, SILHOUETTE_MAP];
+pub const SHADERS: &[Shader] = &[
+    CONSTANT_VISIBILITY,
+    OCCLUDER_PLANES,
+    PLANE_CUTS,
+    PLANE_RECTANGLES,
+    DEPTH,
+    SHADOW_MAP,
+    PLANAR,
+    SILHOUETTE,
+    PROJECTIVE_TEXTURE,
+    SOFT_PLANAR,
+    STENCIL_VOLUMES,
+    SILHOUETTE_POINTS,
+    SILHOUETTE_MAP,
+];
 
 /// Features that some technique uses, asked for where the adapter has them.
 const WANTED: wgpu::Features = wgpu::Features::DEPTH_CLIP_CONTROL

@@ -74,6 +74,16 @@ pub(crate) enum Part {
     Ground,
 }
 
+impl Part {
+    fn holds(self, batch: &Batch) -> bool {
+        match self {
+            Self::All => true,
+            Self::Casters => !batch.ground,
+            Self::Ground => batch.ground,
+        }
+    }
+}
+
 /// The bind group layouts of all techniques: group 0 is the frame, group 1 a material; group 2 is the technique's own.
 #[derive(Clone, Debug)]
 pub(crate) struct Layouts {
@@ -139,14 +149,19 @@ impl Stage {
         &self.placements
     }
 
-    /// Draw calls of a pass over all casters.
+    /// Draw calls of a pass over everything.
     #[must_use]
     pub fn calls_per_pass(&self) -> usize {
+        self.calls_of(Part::All)
+    }
+
+    /// Draw calls of a pass over a part.
+    pub(crate) fn calls_of(&self, part: Part) -> usize {
         let calls = match self.draw_calls {
             DrawCalls::Instanced => 1,
             DrawCalls::OnePerInstance => self.placements.len(),
         };
-        calls * self.model.batches.len()
+        calls * self.model.batches.iter().filter(|batch| part.holds(batch)).count()
     }
 
     /// Draws a frame with what `technique` prepares for its light. Alpha is 255 everywhere but on the background of
@@ -223,12 +238,7 @@ impl Stage {
         part: Part,
         pipeline: impl Fn(&Batch) -> &'p wgpu::RenderPipeline,
     ) {
-        let drawn = |batch: &&Batch| match part {
-            Part::All => true,
-            Part::Casters => !batch.ground,
-            Part::Ground => batch.ground,
-        };
-        for batch in self.model.batches.iter().filter(drawn) {
+        for batch in self.model.batches.iter().filter(|batch| part.holds(batch)) {
             pass.set_pipeline(pipeline(batch));
             pass.set_bind_group(1, &batch.bind_group, &[]);
             let count = self.placements.len() as u32;
