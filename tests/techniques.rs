@@ -1,5 +1,8 @@
 //! Each technique against the traced reference on closed-form scenes, with the class of error that is expected of it.
 
+#[path = "techniques/golden.rs"]
+mod golden;
+mod pictures;
 #[path = "techniques/shadow_map.rs"]
 mod shadow_map;
 mod stages;
