@@ -1,15 +1,18 @@
 //! Each technique against the traced reference on closed-form scenes, with the class of error that is expected of it.
 
+#[path = "techniques/golden.rs"]
+mod golden;
 #[path = "techniques/perspective_shadow_map.rs"]
 mod perspective_shadow_map;
-#[path = "techniques/shadow_map.rs"]
-mod shadow_map;
-#[path = "techniques/silhouette_map.rs"]
-mod silhouette_map;
+mod pictures;
 #[path = "techniques/planar.rs"]
 mod planar;
 #[path = "techniques/projective_texture.rs"]
 mod projective_texture;
+#[path = "techniques/shadow_map.rs"]
+mod shadow_map;
+#[path = "techniques/silhouette_map.rs"]
+mod silhouette_map;
 #[path = "techniques/soft_planar.rs"]
 mod soft_planar;
 mod stages;

@@ -3,6 +3,8 @@
 #[path = "volumes/borders.rs"]
 mod borders;
 #[allow(dead_code, reason = "each test binary uses its part")]
+mod pictures;
+#[allow(dead_code, reason = "each test binary uses its part")]
 mod stages;
 #[path = "volumes/stencil.rs"]
 mod stencil;
