@@ -23,6 +23,7 @@ pub mod shadow_map;
 pub mod stage;
 pub mod stencil_volumes;
 pub mod technique;
+pub mod transparent;
 pub mod turntable;
 pub mod unshadowed;
 mod upload;

@@ -6,3 +6,5 @@ mod borders;
 mod stages;
 #[path = "volumes/stencil.rs"]
 mod stencil;
+#[path = "volumes/transparent.rs"]
+mod transparent;

@@ -57,9 +57,23 @@ pub const SHADOW_MAP: Shader = forward!("shadow_map", "shadow_map.wgsl");
 /// Shadow volumes into the stencil.
 pub const STENCIL_VOLUMES: Shader =
     Shader { name: "stencil_volumes", parts: parts!["frame.wgsl", "volumes.wgsl", "stencil_volumes.wgsl"] };
+/// Shadow volumes into a float target.
+pub const TRANSPARENT_VOLUMES: Shader =
+    Shader { name: "transparent_volumes", parts: parts!["frame.wgsl", "volumes.wgsl", "transparent_volumes.wgsl"] };
+/// The model in the light that these leave.
+pub const TRANSPARENT: Shader = forward!("transparent", "transparent.wgsl");
 /// All passes.
-pub const SHADERS: &[Shader] =
-    &[CONSTANT_VISIBILITY, OCCLUDER_PLANES, PLANE_CUTS, PLANE_RECTANGLES, DEPTH, SHADOW_MAP, STENCIL_VOLUMES];
+pub const SHADERS: &[Shader] = &[
+    CONSTANT_VISIBILITY,
+    OCCLUDER_PLANES,
+    PLANE_CUTS,
+    PLANE_RECTANGLES,
+    DEPTH,
+    SHADOW_MAP,
+    STENCIL_VOLUMES,
+    TRANSPARENT_VOLUMES,
+    TRANSPARENT,
+];
 
 /// Features that some technique uses, asked for where the adapter has them.
 const WANTED: wgpu::Features = wgpu::Features::DEPTH_CLIP_CONTROL

@@ -72,6 +72,10 @@ pub(crate) enum Part {
     Casters,
     /// Those of the ground.
     Ground,
+    /// Those that no light passes.
+    Opaque,
+    /// Those that some light passes.
+    Transparent,
 }
 
 /// The bind group layouts of all techniques: group 0 is the frame, group 1 a material; group 2 is the technique's own.
@@ -147,6 +151,12 @@ impl Stage {
             DrawCalls::OnePerInstance => self.placements.len(),
         };
         calls * self.model.batches.len()
+    }
+
+    /// Does light pass some of the triangles?
+    #[must_use]
+    pub fn has_transparent(&self) -> bool {
+        self.model.batches.iter().any(|batch| batch.transparent)
     }
 
     /// Draws a frame with what `technique` prepares for its light. Alpha is 255 everywhere but on the background of
@@ -227,6 +237,8 @@ impl Stage {
             Part::All => true,
             Part::Casters => !batch.ground,
             Part::Ground => batch.ground,
+            Part::Opaque => !batch.transparent,
+            Part::Transparent => batch.transparent,
         };
         for batch in self.model.batches.iter().filter(drawn) {
             pass.set_pipeline(pipeline(batch));
