@@ -172,6 +172,45 @@ fn a_volume_contains_a_point_as_often_as_triangles_block_it() {
 }
 
 #[test]
+fn halved_bodies_cast_on_the_same_points() {
+    let moved = |body: Triangles, by: Vec3| -> Triangles { body.into_iter().map(|t| t.map(|p| p + by)).collect() };
+    let inside_out = |body: Triangles| -> Triangles { body.into_iter().map(|[a, b, c]| [a, c, b]).collect() };
+    let scenes: Vec<(&str, Triangles)> = vec![
+        ("box", cube(0.5)),
+        ("box inside out", inside_out(cube(0.5))),
+        ("box in a box", [cube(0.7), cube(0.3)].concat()),
+        ("boxes through each other", [cube(0.5), moved(cube(0.4), Vec3::new(0.3, 0.2, 0.1))].concat()),
+        // They share an edge.
+        ("boxes side by side", [cube(0.25), moved(cube(0.25), Vec3::new(0.5, 0.5, 0.0))].concat()),
+        ("box and plate", [cube(0.3), plate(0.6, 0.5)].concat()),
+        ("open box", cube(0.5)[2..].to_vec()),
+    ];
+    for (name, triangles) in scenes {
+        let casters = Casters::new(&triangles, &vec![0; triangles.len()]);
+        let halved = casters.clone().halved();
+        for light in lights() {
+            let (whole, volume) = (casters.volume(light), halved.volume(light));
+            let caps = |volume: &Volume| volume.towards.len() + volume.away.len();
+            if name.starts_with("box") && name != "box and plate" && light.w == 0.0 {
+                assert_eq!(2 * caps(&volume), caps(&whole), "{name}, light {light}");
+            }
+            let mut random = Random(7);
+            let mut decided = 0;
+            for _ in 0..1_000 {
+                let (p, d) = (random.point().as_dvec3(), random.point().as_dvec3());
+                let Some(blocking) = blocking(&casters, p, light) else { continue };
+                let Some(found) = crossings(&halved, &volume, light, (p, d)) else { continue };
+                let (blocking, found) = (blocking[&0], found.get(&0).copied().unwrap_or_default());
+                assert_eq!(found > 0, blocking > 0, "{name}, light {light}: {found} of {blocking} at {p}");
+                assert_eq!(halved.blockers(p.as_vec3(), light) as i32, found, "{name}, light {light}: {p}");
+                decided += 1;
+            }
+            assert!(decided > 900, "{name}, light {light}: {decided}");
+        }
+    }
+}
+
+#[test]
 fn sides_are_counted_as_often_as_the_edges_are_borders() {
     let count = |triangles: &Triangles, light: Vec3| {
         let casters = Casters::new(triangles, &vec![0; triangles.len()]);

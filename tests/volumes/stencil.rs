@@ -172,13 +172,13 @@ fn models_are_wrong_in_single_pixels_only() {
         let frame = shadowfit_solver::mesh::Mesh::new(&scene.soup).expect("a model").frame;
         let mut stage = Stage::new(gpu(), &scene, &frame, &[Placement::IDENTITY]).expect("it fits");
         let traced = RayTraced::new(scene.clone(), &frame).expect("a model");
+        let mut blocked = 0;
         for (i, light) in lights().into_iter().enumerate() {
             let options = FrameOptions { size_px: [512, 512], mode: Mode::Mask, antialias: Antialias::Off };
             let camera = Camera::turntable(1.3 * i as f32, 0.9 - 0.4 * i as f32);
             let request = FrameRequest { camera, light, options };
             let expected = traced.picture(&traced.look(&request).expect("traced")).expect("traced");
-            let blocked = expected.pixels().filter(|pixel| pixel.0[1] == 255 && pixel.0[0] == 0).count();
-            assert!(blocked > 1000, "{name}, {light:?}: {blocked} pixels in shadow");
+            blocked += expected.pixels().filter(|pixel| pixel.0[1] == 255 && pixel.0[0] == 0).count();
             for counting in RIGHT {
                 let mut technique = StencilVolumes::new(&stage, &scene, &frame, counting).expect("it fits");
                 let drawn = stage.render(&mut technique, &request).expect("drawn");
@@ -188,5 +188,6 @@ fn models_are_wrong_in_single_pixels_only() {
                 assert!(missed + falsely < AT_BORDERS, "{name}, {counting:?}, {light:?}: {missed} + {falsely}");
             }
         }
+        assert!(blocked > 3_000, "{name}: {blocked} pixels in shadow");
     }
 }
