@@ -34,6 +34,7 @@ pub mod stage;
 pub mod stencil_volumes;
 pub mod technique;
 pub mod timing;
+pub mod transparent;
 pub mod turntable;
 pub mod unshadowed;
 mod upload;

@@ -16,5 +16,9 @@ mod silhouette_map;
 #[path = "techniques/soft_planar.rs"]
 mod soft_planar;
 mod stages;
+#[path = "techniques/stencil_volumes.rs"]
+mod stencil_volumes;
+#[path = "techniques/transparent.rs"]
+mod transparent;
 #[path = "techniques/unshadowed.rs"]
 mod unshadowed;

@@ -23,6 +23,7 @@ use wgpu::util::{DeviceExt, TextureDataOrder};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Look {
     ground: bool,
+    transparent: bool,
     double_sided: bool,
     has_holes: bool,
     image: Option<usize>,
@@ -37,6 +38,8 @@ const EXTREME_DIRECTIONS: usize = 512;
 pub struct Batch {
     /// Of the ground: receives and does not cast.
     pub ground: bool,
+    /// Light passes it ([`Material::transmittance`](crate::scene::Material)).
+    pub transparent: bool,
     /// Both sides are drawn.
     pub double_sided: bool,
     /// Its image cuts holes.
@@ -94,8 +97,8 @@ impl Model {
                 }
             };
             let bind_group = bind(gpu, material, &materials, view, look.repeat);
-            let Look { ground, double_sided, has_holes, .. } = look;
-            batches.push(Batch { ground, double_sided, has_holes, bind_group, vertices: range });
+            let Look { ground, transparent, double_sided, has_holes, .. } = look;
+            batches.push(Batch { ground, transparent, double_sided, has_holes, bind_group, vertices: range });
         }
         Ok(Self { vertices, batches, extremes, bounds })
     }
@@ -112,6 +115,7 @@ fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Range<u32>
         triangles_of
             .entry(Look {
                 ground,
+                transparent: material.transmittance.is_some(),
                 double_sided,
                 has_holes: material.alpha_cutoff.is_some(),
                 image: material.image,

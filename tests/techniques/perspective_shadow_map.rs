@@ -32,7 +32,7 @@ fn field_of_200() -> (Case, Camera) {
     let stage = Stage::new(gpu(), &scene, &frame, &placements).expect("it fits");
     let matrices: Vec<_> = placements.iter().map(|placement| placement.world_from_unit()).collect();
     let traced = RayTraced::new(scene.instanced(&matrices, &frame), &WORLD).expect("a model");
-    (Case { stage, traced }, camera)
+    (Case { stage, traced, world: WORLD }, camera)
 }
 
 /// Wrong shares of the covered pixels of a plain map and a warped one of equal size, over some lights.

@@ -104,17 +104,7 @@ fn corners_are_points_of_the_silhouette() {
 
 #[test]
 fn a_teapot_is_no_worse_than_with_a_shadow_map() {
-    let scene = load(std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/models/teapot.glb"))).expect("a model");
-    let frame = Mesh::new(&scene.soup).expect("a model").frame;
-    let stage = shadowfit::render::stage::Stage::new(
-        crate::stages::gpu(),
-        &scene,
-        &frame,
-        &[shadowfit::render::stage::Placement::IDENTITY],
-    )
-    .expect("it fits");
-    let traced = shadowfit::render::ray_traced::RayTraced::new(scene, &frame).expect("a model");
-    let mut case = Case { stage, traced };
+    let mut case = Case::of_model("teapot.glb");
     for size in [128, 256, 512] {
         let (mut plain, mut silhouette) = ([0.0; 2], [0.0; 2]);
         for light in [directional(0.3, 1.0, 0.2), directional(1.0, 0.5, 0.4), directional(-0.7, 0.6, 0.8)] {
