@@ -25,7 +25,7 @@ fn vs_rectangle(@builtin(vertex_index) vertex: u32, @builtin(instance_index) ins
     );
     let ab = corners[vertex];
     let p = rectangles[instance].origin.xyz + ab.x * rectangles[instance].u.xyz + ab.y * rectangles[instance].v.xyz;
-    return Corner(frame.clip_from_unit * vec4f(p, 1.0), ab, instance);
+    return Corner(instances[0].clip_from_unit * vec4f(p, 1.0), ab, instance);
 }
 
 @fragment

@@ -36,12 +36,13 @@ struct Crossing {
 }
 
 // The planes that some list below names.
-@group(0) @binding(1) var<storage, read> casting: array<CastingPlane>;
-@group(0) @binding(2) var occluders: texture_2d_array<f32>;
-@group(0) @binding(3) var occluder_sampler: sampler;
-// The planes that each section reads under this light: first two numbers a section, where its list starts and ends,
-// then the lists, indices into `casting`. The last section stands for triangles that belong to none; its list is empty.
-@group(0) @binding(5) var<storage, read> lists: array<u32>;
+@group(2) @binding(0) var<storage, read> casting: array<CastingPlane>;
+@group(2) @binding(1) var occluders: texture_2d_array<f32>;
+@group(2) @binding(2) var occluder_sampler: sampler;
+// The planes that each section of each instance reads under this light: first the number of sections, then two numbers a
+// section, where its list starts and ends, then the lists, indices into `casting`. Behind the sections of an instance
+// stands an empty one for triangles that belong to none.
+@group(2) @binding(3) var<storage, read> lists: array<u32>;
 
 // Where the ray from p towards a directional light crosses the plane beyond its bias.
 fn crossing(plane: CastingPlane, p: vec3f) -> Crossing {
@@ -78,12 +79,18 @@ fn sample(slot: OccluderSlot, ab: vec2f) -> f32 {
     return select(value, f32(value >= SDF_BORDER), slot.encoding == 1u);
 }
 
-// Predicted visibility of a receiver at p, on a surface of that section, under a directional light: left as soon as one
-// plane blocks.
-fn visibility(section: u32, p: vec3f) -> f32 {
+// Where the list of a section starts and ends.
+fn list_of(instance: u32, section: u32) -> vec2u {
+    let sections = lists[0];
+    let entry = 1u + 2u * (instance * (sections + 1u) + min(section, sections));
+    return vec2u(lists[entry], lists[entry + 1u]);
+}
+
+// Predicted visibility of a receiver at p that reads `list`, under a directional light: left as soon as one plane
+// blocks.
+fn visibility(list: vec2u, p: vec3f) -> f32 {
     var v = 1.0;
-    let end = lists[2u * section + 1u];
-    for (var i = lists[2u * section]; i < end && v > 0.0; i++) {
+    for (var i = list.x; i < list.y && v > 0.0; i++) {
         let plane = lists[i];
         let hit = crossing(casting[plane], p);
         if hit.casts {
@@ -94,10 +101,9 @@ fn visibility(section: u32, p: vec3f) -> f32 {
 }
 
 // The same under a point light at c.
-fn visibility_point_light(section: u32, c: vec3f, p: vec3f) -> f32 {
+fn visibility_point_light(list: vec2u, c: vec3f, p: vec3f) -> f32 {
     var v = 1.0;
-    let end = lists[2u * section + 1u];
-    for (var i = lists[2u * section]; i < end && v > 0.0; i++) {
+    for (var i = list.x; i < list.y && v > 0.0; i++) {
         let plane = lists[i];
         let hit = crossing_point_light(casting[plane], c, p);
         if hit.casts {

@@ -14,4 +14,4 @@ struct Rectangle {
     slot: OccluderSlot,
 }
 
-@group(0) @binding(4) var<storage, read> rectangles: array<Rectangle>;
+@group(2) @binding(4) var<storage, read> rectangles: array<Rectangle>;

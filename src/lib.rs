@@ -7,6 +7,7 @@ pub mod cli;
 pub mod effort;
 mod fitting;
 pub mod gltf_file;
+pub mod masks;
 pub mod pipeline;
 pub mod render;
 pub mod report;

@@ -8,12 +8,22 @@
 //! Not guaranteed: equal bytes between the two, or between two drivers (silhouettes, rounding of the last bit).
 
 mod atlas;
+mod bindings;
 mod camera;
 pub mod cpu;
+mod depth_pass;
+mod forward;
 pub mod gpu;
 mod layout;
-mod pipelines;
+mod light_view;
+pub mod occluder_planes;
+mod plane_view;
+pub mod ray_traced;
+pub mod shadow_map;
+pub mod stage;
+pub mod technique;
 pub mod turntable;
+pub mod unshadowed;
 mod upload;
 
 pub use camera::Camera;
@@ -70,7 +80,7 @@ pub enum Light {
     /// From a point; it does not fall off with distance.
     Point {
         /// Where it is, unit space.
-        position_unit: Vec3,
+        position: Vec3,
     },
 }
 
@@ -80,7 +90,7 @@ impl Light {
     pub fn towards(&self, p_unit: Vec3) -> Vec3 {
         match *self {
             Self::Directional { to_light } => to_light,
-            Self::Point { position_unit } => position_unit - p_unit,
+            Self::Point { position } => position - p_unit,
         }
     }
 
@@ -150,6 +160,14 @@ pub enum RenderError {
         height: u32,
         /// Pixels.
         limit: u32,
+    },
+    /// A technique needs what the adapter does not have.
+    #[error("{technique} needs {feature}, which the adapter does not have")]
+    Unsupported {
+        /// Who.
+        technique: &'static str,
+        /// What.
+        feature: &'static str,
     },
     /// The CPU renderer does not draw this mode.
     #[error("{0:?} frames need a graphics adapter")]

@@ -23,6 +23,7 @@ mod assembly;
 mod buffers;
 mod document;
 mod extensions;
+mod ground;
 mod materials;
 mod nodes;
 mod primitive;
@@ -102,6 +103,8 @@ pub struct Scene {
     pub images: Vec<Arc<image::RgbaImage>>,
     /// All that was left out, counted.
     pub skipped: Vec<Skipped>,
+    /// How many of the last triangles are a ground (see [`Scene::stand_on_ground`]); 0 of a file.
+    pub ground_triangles: usize,
 }
 
 /// Why a file is not a scene.

@@ -6,6 +6,7 @@
 //! reference | planes | difference.
 
 use crate::{
+    masks::{MaskErrors, difference, mean_flip, side_by_side},
     render::{
         Antialias, Camera, FrameOptions, FrameRequest, Light, Mode, RenderError,
         cpu::{self, Primary, PrimaryHit},
@@ -15,8 +16,7 @@ use crate::{
     scene::Scene,
 };
 use glam::Vec3;
-use image::{Rgba, RgbaImage};
-use rayon::prelude::*;
+use image::RgbaImage;
 use serde::Serialize;
 use shadowfit_solver::{
     mesh::{Mesh, ray_origin},
@@ -80,11 +80,6 @@ pub struct Validation {
 /// Elevations of the views in degrees, in turn: from above, from below, level.
 const ELEVATIONS_DEG: [f32; 4] = [25.0, -15.0, 50.0, 5.0];
 
-/// Mean FLIP is computed for a screen seen at 67 pixels per degree: 0.7 m away, 0.7 m and 3840 pixels wide, the
-/// default of Andersson et al., "FLIP: A Difference Evaluator for Alternating Images" (2020).
-#[cfg(feature = "flip")]
-const FLIP_PIXELS_PER_DEGREE: f32 = 67.0;
-
 /// The renderer under test.
 enum Renderer<'a> {
     Gpu(Box<turntable::Turntable>, String),
@@ -125,24 +120,6 @@ impl<'a> Renderer<'a> {
     }
 }
 
-/// Sums over compared pixels.
-#[derive(Clone, Copy, Default)]
-struct PixelErrors {
-    covered: f64,
-    missed: f64,
-    false_: f64,
-}
-
-impl PixelErrors {
-    fn add(self, other: Self) -> Self {
-        Self {
-            covered: self.covered + other.covered,
-            missed: self.missed + other.missed,
-            false_: self.false_ + other.false_,
-        }
-    }
-}
-
 /// Renders and compares. `lights` are unit directions towards the light, the worst first; as many as the options
 /// ask for are used.
 ///
@@ -156,7 +133,7 @@ pub fn validate(
 ) -> Result<Validation, RenderError> {
     let mut renderer = Renderer::new(scene, mesh, set)?;
     let size_px = [options.size_px; 2];
-    let (mut total, mut flips, mut worst) = (PixelErrors::default(), Vec::new(), None);
+    let (mut total, mut flips, mut worst) = (MaskErrors::default(), Vec::new(), None);
     let lights = &lights[..options.lights.min(lights.len())];
     for view in 0..options.views {
         let azimuth_deg = 360.0 * (view as f32 + 0.35) / options.views as f32;
@@ -173,90 +150,29 @@ pub fn validate(
             };
             let traced = primary.picture((scene, mesh), Mode::Mask, &light, visibility)?;
             let drawn = draw(Mode::Mask)?;
-            let errors = compare(&traced, &drawn);
-            total = total.add(errors);
-            let wrong = errors.missed + errors.false_;
+            let errors = MaskErrors::between(&traced, &drawn);
+            total = total.plus(errors);
+            let wrong = errors.wrong();
             let is_worst = index == 0 && worst.as_ref().is_none_or(|(most, _)| wrong > *most);
             if is_worst || cfg!(feature = "flip") {
                 let reference = primary.picture((scene, mesh), Mode::Shaded, &light, visibility)?;
                 let shaded = draw(Mode::Shaded)?;
                 flips.extend(mean_flip(&reference, &shaded));
                 if is_worst {
-                    worst = Some((wrong, side_by_side([&reference, &shaded, &difference(&traced, &drawn)])));
+                    worst = Some((wrong, side_by_side(&[&reference, &shaded, &difference(&traced, &drawn)])));
                 }
             }
         }
     }
-    let share = |x: f64| if total.covered > 0.0 { x / total.covered } else { 0.0 };
     let errors = ImageErrors {
         renderer: renderer.name(),
-        mask_error: share(total.missed + total.false_),
-        missed: share(total.missed),
-        false_: share(total.false_),
+        mask_error: total.share(total.wrong()),
+        missed: total.share(total.missed),
+        false_: total.share(total.false_),
         flip_mean: (!flips.is_empty()).then(|| flips.iter().sum::<f64>() / flips.len() as f64),
         frames: options.views * lights.len(),
         size_px: options.size_px,
     };
     let comparison = worst.map_or_else(|| RgbaImage::new(1, 1), |(_, picture)| picture);
     Ok(Validation { errors, comparison })
-}
-
-/// Missed and false shadow over the pixels that both masks cover.
-fn compare(traced: &RgbaImage, drawn: &RgbaImage) -> PixelErrors {
-    let pixel = |(t, d): (&[u8], &[u8])| {
-        let covered = t[2] == 255 && d[2] == 255;
-        let facing = covered && t[1] == 255 && d[1] == 255;
-        let wrong = if facing { (f64::from(d[0]) - f64::from(t[0])) / 255.0 } else { 0.0 };
-        PixelErrors { covered: f64::from(u8::from(covered)), missed: wrong.max(0.0), false_: (-wrong).max(0.0) }
-    };
-    let rows = traced.as_raw().par_chunks(4096).zip(drawn.as_raw().par_chunks(4096));
-    let sums: Vec<PixelErrors> = rows
-        .map(|(t, d)| {
-            t.chunks_exact(4).zip(d.chunks_exact(4)).map(pixel).fold(PixelErrors::default(), PixelErrors::add)
-        })
-        .collect();
-    sums.into_iter().fold(PixelErrors::default(), PixelErrors::add)
-}
-
-/// Grey where right, orange where shadow is missing, blue where it is too much (Okabe and Ito's safe colours).
-fn difference(traced: &RgbaImage, drawn: &RgbaImage) -> RgbaImage {
-    RgbaImage::from_fn(traced.width(), traced.height(), |x, y| {
-        let (t, d) = (traced.get_pixel(x, y).0, drawn.get_pixel(x, y).0);
-        if t[2] == 0 || d[2] == 0 {
-            return Rgba([255, 255, 255, 255]);
-        }
-        let grey = 90.0 + f32::from(t[0]) / 255.0 * 120.0;
-        let wrong = if t[1] == 255 && d[1] == 255 { (f32::from(d[0]) - f32::from(t[0])) / 255.0 } else { 0.0 };
-        let tint = if wrong > 0.0 { [213.0, 94.0, 0.0] } else { [0.0, 114.0, 178.0] };
-        let mixed = tint.map(|c| (grey + (c - grey) * wrong.abs()).round() as u8);
-        Rgba([mixed[0], mixed[1], mixed[2], 255])
-    })
-}
-
-fn side_by_side(pictures: [&RgbaImage; 3]) -> RgbaImage {
-    let width: u32 = pictures.iter().map(|p| p.width()).sum();
-    let mut out = RgbaImage::new(width, pictures[0].height());
-    let mut left = 0;
-    for picture in pictures {
-        image::imageops::replace(&mut out, picture, left, 0);
-        left += i64::from(picture.width());
-    }
-    out
-}
-
-/// Mean FLIP difference, or `None` where the feature is off.
-#[cfg(feature = "flip")]
-fn mean_flip(reference: &RgbaImage, picture: &RgbaImage) -> Option<f64> {
-    let image = |rgba: &RgbaImage| {
-        let rgb: Vec<u8> = rgba.pixels().flat_map(|p| [p.0[0], p.0[1], p.0[2]]).collect();
-        nv_flip::FlipImageRgb8::with_data(rgba.width(), rgba.height(), &rgb)
-    };
-    let map = nv_flip::flip(image(reference), image(picture), FLIP_PIXELS_PER_DEGREE);
-    Some(f64::from(nv_flip::FlipPool::from_image(&map).mean()))
-}
-
-/// Mean FLIP difference, or `None` where the feature is off.
-#[cfg(not(feature = "flip"))]
-fn mean_flip(_: &RgbaImage, _: &RgbaImage) -> Option<f64> {
-    None
 }

@@ -73,8 +73,8 @@ fn lights(planes: &[BakedPlane]) -> Vec<Light> {
         Light::Directional { to_light: Vec3::Y },
         Light::Directional { to_light: in_plane },
         Light::Directional { to_light: grazing.normalize() },
-        Light::Point { position_unit: Vec3::new(0.9, 1.4, 0.8) },
-        Light::Point { position_unit: Vec3::new(-0.1, 0.3, 0.1) },
+        Light::Point { position: Vec3::new(0.9, 1.4, 0.8) },
+        Light::Point { position: Vec3::new(-0.1, 0.3, 0.1) },
     ]
 }
 
@@ -196,7 +196,7 @@ fn a_triangle_reads_the_list_of_its_section() {
     let active = ActiveLists { directions, lists: vec![lists(0, 1), lists(1, 0), lists(1, 1)] };
     let sections = vec![vec![0, 1], vec![1, 0], vec![]];
     let set = BakedSet { planes, sections, active: Some(active) };
-    let high = Light::Point { position_unit: Vec3::new(0.1, 0.9, 0.0) };
+    let high = Light::Point { position: Vec3::new(0.1, 0.9, 0.0) };
     for (section, light, is_lit) in [
         (0, directional(0.1, 1.0, 0.0), false),
         (1, directional(0.1, 1.0, 0.0), true),
@@ -344,12 +344,12 @@ fn a_plate_shades_exactly_the_ground_below_it() {
 fn a_plate_under_a_point_light_casts_a_larger_shadow() {
     let c = Vec3::new(0.1, 0.9, -0.05);
     let lit = |p: Vec3| blocks(p + (c - p) * (0.3 / 0.9), 0.2113).map(|blocked| !blocked);
-    check_ground(&[plate(0.3, 0.2113, Side::Both)], Light::Point { position_unit: c }, lit);
+    check_ground(&[plate(0.3, 0.2113, Side::Both)], Light::Point { position: c }, lit);
 }
 
 #[test]
 fn planes_cast_only_between_receiver_and_light() {
-    let point = Light::Point { position_unit: Vec3::new(0.0, 0.5, 0.0) };
+    let point = Light::Point { position: Vec3::new(0.0, 0.5, 0.0) };
     let all_lit = |_| Some(true);
     // Behind the receiver; beyond a point light; nearer than the bias.
     check_ground(&[plate(-0.2, 0.3, Side::Both)], directional(0.1, 1.0, 0.2), all_lit);
@@ -363,7 +363,7 @@ fn planes_cast_only_between_receiver_and_light() {
 
 #[test]
 fn light_from_behind_the_surface_does_not_reach_it() {
-    for light in [directional(0.1, -1.0, 0.0), Light::Point { position_unit: Vec3::new(0.2, -0.5, 0.0) }] {
+    for light in [directional(0.1, -1.0, 0.0), Light::Point { position: Vec3::new(0.2, -0.5, 0.0) }] {
         check_ground(&[plate(0.3, 0.3, Side::Both)], light, |_| Some(false));
     }
 }
@@ -375,7 +375,7 @@ fn a_plane_serves_the_side_it_is_made_for() {
     check_ground(&[plate(0.3, 0.311, Side::Front)], sun, shadow);
     check_ground(&[plate(0.3, 0.311, Side::Back)], sun, |_| Some(true));
     let c = Vec3::new(0.0, 1.2, 0.0);
-    let lamp = Light::Point { position_unit: c };
+    let lamp = Light::Point { position: c };
     check_ground(&[plate(0.3, 0.311, Side::Front)], lamp, |p| shadow(p + (c - p) * 0.25));
     check_ground(&[plate(0.3, 0.311, Side::Back)], lamp, |_| Some(true));
 }
@@ -388,7 +388,7 @@ fn broken_planes_and_no_planes_cast_nothing() {
         BakedPlane { plane: ShadowPlane { u, ..good.plane }, ..good }
     };
     let broken = [flat(Vec3::ZERO), flat(Vec3::Z), flat(Vec3::splat(f32::NAN)), flat(Vec3::X * 1e-30)];
-    for light in [sun, Light::Point { position_unit: Vec3::new(0.1, 0.9, 0.1) }] {
+    for light in [sun, Light::Point { position: Vec3::new(0.1, 0.9, 0.1) }] {
         check_ground(&[], light, |_| Some(true));
         check_ground(&broken, light, |_| Some(true));
     }

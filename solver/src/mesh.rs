@@ -259,6 +259,23 @@ impl Mesh {
         )
     }
 
+    /// Does anything block the segment from `origin` (see [`ray_origin`]) to `end`?
+    #[must_use]
+    pub fn is_blocked_before(&self, origin: Vec3, end: Vec3) -> bool {
+        let distance = (end - origin).length();
+        let direction = (end - origin).normalize_or_zero();
+        let watertight = WatertightRay::new(origin, direction);
+        any_hit(
+            &self.bvh,
+            &bvh_ray(origin, direction),
+            #[inline(always)]
+            |i| {
+                let hit = watertight.intersect(&self.corners[i as usize]);
+                hit.is_some_and(|(t, barycentric)| t < distance && self.is_solid(i, barycentric))
+            },
+        )
+    }
+
     /// The nearest surface from `origin` in direction `direction` (unit). `drawn` says whether a triangle counts
     /// when seen from its front (true) or back (false).
     #[must_use]

@@ -1,6 +1,6 @@
-//! The camera of the turntable: looks at the centre of unit space from any side.
+//! The camera: around the centre of unit space (the turntable), or anywhere.
 //!
-//! [`Camera::clip_from_unit`] (rasteriser) and [`Camera::ray`] (tracer) are built from the same axes and extents,
+//! [`Camera::clip_from_world`] (rasteriser) and [`Camera::ray`] (tracer) are built from the same axes and extents,
 //! so the ray through a pixel's centre meets the point that the rasteriser draws there.
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
@@ -21,13 +21,15 @@ enum Projection {
     Orthographic { half_extent: f32 },
 }
 
-/// A view of unit space.
+/// A view of world space, which is unit space where one instance stands as it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     right: Vec3,
     up: Vec3,
     forward: Vec3,
-    distance: f32,
+    eye: Vec3,
+    /// Nearest and farthest depth that is drawn.
+    depth: [f32; 2],
     projection: Projection,
 }
 
@@ -49,22 +51,45 @@ impl Camera {
         Self::around_centre(azimuth_rad, elevation_rad, 2.0 * REACH, projection)
     }
 
+    /// Perspective view from `eye` towards `target` with the given field of view over the frame's shorter side; what
+    /// lies between the two depths is drawn. Up is as near to +Y as it can be.
+    #[must_use]
+    pub fn looking(eye: Vec3, target: Vec3, field_of_view_rad: f32, depth: [f32; 2]) -> Self {
+        let forward = (target - eye).normalize_or(Vec3::NEG_Z);
+        let right = forward.cross(Vec3::Y).normalize_or(Vec3::X);
+        let projection = Projection::Perspective { half_tangent: (0.5 * field_of_view_rad).tan() };
+        Self { right, up: right.cross(forward), forward, eye, depth, projection }
+    }
+
     fn around_centre(azimuth_rad: f32, elevation_rad: f32, distance: f32, projection: Projection) -> Self {
         let (sin_a, cos_a) = azimuth_rad.sin_cos();
         let (sin_e, cos_e) = elevation_rad.sin_cos();
+        let forward = -Vec3::new(sin_a * cos_e, sin_e, cos_a * cos_e);
         Self {
             right: Vec3::new(cos_a, 0.0, -sin_a),
             up: Vec3::new(-sin_a * sin_e, cos_e, -cos_a * sin_e),
-            forward: -Vec3::new(sin_a * cos_e, sin_e, cos_a * cos_e),
-            distance,
+            forward,
+            eye: -distance * forward,
+            depth: [distance - REACH, distance + REACH],
             projection,
         }
     }
 
+    /// The same view in a space in which the point p is `scale * p + offset`.
+    #[must_use]
+    pub fn moved(&self, scale: f32, offset: Vec3) -> Self {
+        let projection = match self.projection {
+            Projection::Orthographic { half_extent } => Projection::Orthographic { half_extent: scale * half_extent },
+            perspective @ Projection::Perspective { .. } => perspective,
+        };
+        let (eye, depth) = (scale * self.eye + offset, self.depth.map(|depth| scale * depth));
+        Self { eye, depth, projection, ..*self }
+    }
+
     /// Where the camera stands.
     #[must_use]
-    pub fn eye_unit(&self) -> Vec3 {
-        -self.distance * self.forward
+    pub fn eye(&self) -> Vec3 {
+        self.eye
     }
 
     /// Unit vector of the view.
@@ -73,15 +98,20 @@ impl Camera {
         self.forward
     }
 
-    /// Clip space (wgpu: depth 0..1, y up) from unit space, for a frame of `size_px`.
+    /// Nearest and farthest depth that is drawn.
     #[must_use]
-    pub fn clip_from_unit(&self, size_px: [u32; 2]) -> Mat4 {
+    pub fn depth(&self) -> [f32; 2] {
+        self.depth
+    }
+
+    /// Clip space (wgpu: depth 0..1, y up) from world space, for a frame of `size_px`.
+    #[must_use]
+    pub fn clip_from_world(&self, size_px: [u32; 2]) -> Mat4 {
         let half = self.half_extents(size_px);
-        let (near, far) = (self.distance - REACH, self.distance + REACH);
-        // The eye lies on the view axis: right and up need no offset, depth is forward.p + distance.
-        let x = (self.right / half.x).extend(0.0);
-        let y = (self.up / half.y).extend(0.0);
-        let depth = self.forward.extend(self.distance);
+        let [near, far] = self.depth;
+        let row = |axis: Vec3| axis.extend(-axis.dot(self.eye));
+        let (x, y) = (row(self.right / half.x), row(self.up / half.y));
+        let depth = row(self.forward);
         let (z, w) = match self.projection {
             Projection::Perspective { .. } => ((depth - near * Vec4::W) * (far / (far - near)), depth),
             Projection::Orthographic { .. } => ((depth - near * Vec4::W) / (far - near), Vec4::W),
@@ -90,7 +120,7 @@ impl Camera {
     }
 
     /// The ray through a point of the frame, in pixels from the upper left corner: the centre of pixel (i, j) is
-    /// (i + 0.5, j + 0.5). Origin and unit direction, unit space.
+    /// (i + 0.5, j + 0.5). Origin and unit direction, world space.
     #[must_use]
     pub fn ray(&self, px: f32, py: f32, size_px: [u32; 2]) -> (Vec3, Vec3) {
         let [width, height] = size_px.map(|n| n as f32);
@@ -98,8 +128,8 @@ impl Camera {
         let on_screen =
             self.right * (half.x * (2.0 * px / width - 1.0)) + self.up * (half.y * (1.0 - 2.0 * py / height));
         match self.projection {
-            Projection::Perspective { .. } => (self.eye_unit(), (self.forward + on_screen).normalize()),
-            Projection::Orthographic { .. } => (self.eye_unit() + on_screen, self.forward),
+            Projection::Perspective { .. } => (self.eye, (self.forward + on_screen).normalize()),
+            Projection::Orthographic { .. } => (self.eye + on_screen, self.forward),
         }
     }
 
@@ -128,7 +158,7 @@ mod tests {
         for camera in cameras() {
             for size in [[640, 480], [100, 300], [64, 64]] {
                 let (origin, direction) = camera.ray(37.5, 51.5, size);
-                let clip = camera.clip_from_unit(size) * (origin + 3.7 * direction).extend(1.0);
+                let clip = camera.clip_from_world(size) * (origin + 3.7 * direction).extend(1.0);
                 let ndc = clip.truncate() / clip.w;
                 let x = (ndc.x + 1.0) * 0.5 * size[0] as f32;
                 let y = (1.0 - ndc.y) * 0.5 * size[1] as f32;
@@ -154,15 +184,15 @@ mod tests {
     fn azimuth_0_looks_from_plus_z_and_90_degrees_from_plus_x() {
         let size = [100, 100];
         let right_of = |camera: Camera, p: Vec3| {
-            let clip = camera.clip_from_unit(size) * p.extend(1.0);
+            let clip = camera.clip_from_world(size) * p.extend(1.0);
             clip.x / clip.w
         };
-        assert!(Camera::turntable(0.0, 0.0).eye_unit().normalize().distance(Vec3::Z) < 1e-6);
+        assert!(Camera::turntable(0.0, 0.0).eye().normalize().distance(Vec3::Z) < 1e-6);
         assert!(right_of(Camera::turntable(0.0, 0.0), Vec3::X) > 0.5);
         let from_x = Camera::turntable(std::f32::consts::FRAC_PI_2, 0.0);
-        assert!(from_x.eye_unit().normalize().distance(Vec3::X) < 1e-6);
+        assert!(from_x.eye().normalize().distance(Vec3::X) < 1e-6);
         assert!(right_of(from_x, Vec3::NEG_Z) > 0.5);
-        let above = Camera::turntable(0.0, 0.5).clip_from_unit(size) * Vec3::Y.extend(1.0);
-        assert!(above.y > 0.0 && Camera::turntable(0.0, 0.5).eye_unit().y > 0.0);
+        let above = Camera::turntable(0.0, 0.5).clip_from_world(size) * Vec3::Y.extend(1.0);
+        assert!(above.y > 0.0 && Camera::turntable(0.0, 0.5).eye().y > 0.0);
     }
 }

@@ -248,7 +248,7 @@ impl<'a> Turntable<'a> {
                 let visibility = |hit: &PrimaryHit| shade::visibility(planes, &rows, list(hit), hit.p_unit);
                 primary.picture(models, options.mode, &request.light, visibility)
             }
-            Light::Point { position_unit: c } => {
+            Light::Point { position: c } => {
                 let visibility = |hit: &PrimaryHit| shade::visibility_point_light(planes, list(hit), c, hit.p_unit);
                 primary.picture(models, options.mode, &request.light, visibility)
             }

@@ -32,16 +32,38 @@ macro_rules! parts {
     };
 }
 
-/// The model, lit, with its shadows.
-pub const FORWARD: Shader =
-    Shader { name: "forward", parts: parts!["frame.wgsl", "planes.wgsl", "rectangles.wgsl", "forward.wgsl"] };
+macro_rules! forward {
+    ($name:literal, $($file:literal),*) => {
+        Shader { name: $name, parts: parts!["frame.wgsl", "surface.wgsl", "forward.wgsl", $($file),*] }
+    };
+}
+
+/// The model without shadows, or in the ambient light alone.
+pub const CONSTANT_VISIBILITY: Shader = forward!("constant_visibility", "constant_visibility.wgsl");
+/// The model with shadow planes.
+pub const OCCLUDER_PLANES: Shader = forward!("occluder_planes", "planes.wgsl", "occluder_planes.wgsl");
+/// The same, with lines where the planes cut it.
+pub const PLANE_CUTS: Shader =
+    forward!("plane_cuts", "planes.wgsl", "occluder_planes.wgsl", "rectangles.wgsl", "plane_cuts.wgsl");
 /// The planes drawn through the model.
 pub const PLANE_RECTANGLES: Shader = Shader {
     name: "plane_rectangles",
     parts: parts!["frame.wgsl", "planes.wgsl", "rectangles.wgsl", "plane_rectangles.wgsl"],
 };
+/// The casters' depth from a light.
+pub const DEPTH: Shader = Shader { name: "depth", parts: parts!["frame.wgsl", "surface.wgsl", "depth.wgsl"] };
+/// The model with a shadow map.
+pub const SHADOW_MAP: Shader = forward!("shadow_map", "shadow_map.wgsl");
 /// All passes.
-pub const SHADERS: &[Shader] = &[FORWARD, PLANE_RECTANGLES];
+pub const SHADERS: &[Shader] = &[CONSTANT_VISIBILITY, OCCLUDER_PLANES, PLANE_CUTS, PLANE_RECTANGLES, DEPTH, SHADOW_MAP];
+
+/// Features that some technique uses, asked for where the adapter has them.
+const WANTED: wgpu::Features = wgpu::Features::DEPTH_CLIP_CONTROL
+    .union(wgpu::Features::DEPTH32FLOAT_STENCIL8)
+    .union(wgpu::Features::FLOAT32_BLENDABLE)
+    .union(wgpu::Features::FLOAT32_FILTERABLE)
+    .union(wgpu::Features::TIMESTAMP_QUERY)
+    .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
 
 /// A graphics device. Cheap to clone; all clones are the same device.
 #[derive(Clone, Debug)]
@@ -83,9 +105,16 @@ impl Gpu {
             max_buffer_size: available.max_buffer_size,
             max_storage_buffer_binding_size: available.max_storage_buffer_binding_size,
             max_texture_array_layers: available.max_texture_array_layers,
+            max_storage_buffers_per_shader_stage: available.max_storage_buffers_per_shader_stage,
             ..wgpu::Limits::downlevel_defaults().using_resolution(available)
         };
-        let descriptor = wgpu::DeviceDescriptor { label: Some("shadowfit"), required_limits, ..Default::default() };
+        let required_features = adapter.features() & WANTED;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("shadowfit"),
+            required_features,
+            required_limits,
+            ..Default::default()
+        };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))?;
         // wgpu's default handler panics; keep the first error for the caller instead.
         let failure = Arc::new(Mutex::new(None));
@@ -105,6 +134,11 @@ impl Gpu {
 
     pub(crate) fn limits(&self) -> wgpu::Limits {
         self.device.limits()
+    }
+
+    /// Has the device these features?
+    pub(crate) fn has(&self, features: wgpu::Features) -> bool {
+        self.device.features().contains(features)
     }
 
     /// Compiles a pass.

@@ -14,11 +14,18 @@ use std::mem::offset_of;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Frame {
-    pub clip_from_unit: Mat4,
+    pub clip_from_world: Mat4,
     pub light: Vec4,
-    pub rectangle_count: u32,
-    pub section_count: u32,
-    pub padding: [u32; 2],
+    pub eye: Vec4,
+}
+
+/// `Instance` of frame.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct Instance {
+    pub clip_from_unit: Mat4,
+    pub world_from_unit: Mat4,
+    pub light: Vec4,
 }
 
 /// `OccluderSlot` of planes.wgsl.
@@ -124,7 +131,7 @@ impl Rectangle {
     }
 }
 
-/// `Material` of forward.wgsl.
+/// `Material` of surface.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Material {
@@ -135,7 +142,7 @@ pub struct Material {
     pub padding: u32,
 }
 
-/// `Vertex` of forward.wgsl: a vertex buffer, so the shader's struct has locations instead of offsets.
+/// `Vertex` of surface.wgsl: a vertex buffer, so the shader's struct has locations instead of offsets.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Vertex {
@@ -176,7 +183,8 @@ macro_rules! layout {
 #[must_use]
 pub fn struct_layouts() -> Vec<StructLayout> {
     vec![
-        layout!(Frame { clip_from_unit, light, rectangle_count, section_count }),
+        layout!(Frame { clip_from_world, light, eye }),
+        layout!(Instance { clip_from_unit, world_from_unit, light }),
         layout!(OccluderSlot { region, layer, channel, encoding }),
         layout!(CastingPlane { a, b, s, slot, bias, side }),
         layout!(Rectangle { origin, u, v, plane, a, b, color, slot }),

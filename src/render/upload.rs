@@ -2,29 +2,45 @@
 
 use super::{
     RenderError,
+    bindings::group,
     gpu::Gpu,
     layout::{Material, Vertex},
-    pipelines::Layouts,
 };
 use crate::scene::Scene;
 use glam::{Vec3, Vec4};
-use shadowfit_solver::mesh::{Frame, Sides};
-use std::{collections::BTreeMap, ops::Range};
+use rayon::prelude::*;
+use shadowfit_solver::{
+    lights::LightDomain,
+    mesh::{Frame, Sides},
+};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    ops::Range,
+};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 
 /// What a draw has in common: cull mode and textures. The order of the draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Look {
+    ground: bool,
     double_sided: bool,
+    has_holes: bool,
     image: Option<usize>,
     repeat: [bool; 2],
 }
 
+/// Directions in which a model's extreme corners are sought.
+const EXTREME_DIRECTIONS: usize = 512;
+
 /// One draw.
 #[derive(Clone, Debug)]
 pub struct Batch {
+    /// Of the ground: receives and does not cast.
+    pub ground: bool,
     /// Both sides are drawn.
     pub double_sided: bool,
+    /// Its image cuts holes.
+    pub has_holes: bool,
     /// Group 1 of the forward pass.
     pub bind_group: wgpu::BindGroup,
     /// In [`Model::vertices`].
@@ -38,13 +54,22 @@ pub struct Model {
     pub vertices: wgpu::Buffer,
     /// Draws.
     pub batches: Vec<Batch>,
+    /// The corners of the casters that lie farthest in some of [`EXTREME_DIRECTIONS`] directions, unit space: what a
+    /// light's view must hold.
+    pub extremes: Vec<Vec3>,
 }
 
 impl Model {
     /// Uploads `scene` in the unit space of `frame`. Triangles keep their order within a batch, so that of two
     /// equal ones the first wins the depth test, as it does in the BVH.
-    pub fn upload(gpu: &Gpu, layouts: &Layouts, scene: &Scene, frame: &Frame) -> Result<Self, RenderError> {
+    pub fn upload(
+        gpu: &Gpu,
+        material: &wgpu::BindGroupLayout,
+        scene: &Scene,
+        frame: &Frame,
+    ) -> Result<Self, RenderError> {
         let (vertices, looks) = vertices(scene, frame);
+        let extremes = extremes(&vertices, &looks);
         let bytes: &[u8] = bytemuck::cast_slice(&vertices);
         let limit = gpu.limits().max_buffer_size;
         if bytes.len() as u64 > limit {
@@ -65,10 +90,11 @@ impl Model {
                     entry.insert(upload_image(gpu, look.image.map(|i| &*scene.images[i]))?)
                 }
             };
-            let bind_group = bind(gpu, layouts, &materials, view, look.repeat);
-            batches.push(Batch { double_sided: look.double_sided, bind_group, vertices: range });
+            let bind_group = bind(gpu, material, &materials, view, look.repeat);
+            let Look { ground, double_sided, has_holes, .. } = look;
+            batches.push(Batch { ground, double_sided, has_holes, bind_group, vertices: range });
         }
-        Ok(Self { vertices, batches })
+        Ok(Self { vertices, batches, extremes })
     }
 }
 
@@ -76,10 +102,20 @@ fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Range<u32>
     let mut triangles_of: BTreeMap<Look, Vec<usize>> = BTreeMap::new();
     for (triangle, &material) in scene.material_of.iter().enumerate() {
         let material = &scene.materials[material as usize];
+        let ground = scene.is_ground(triangle);
         let double_sided = scene.soup.sides[triangle] == Sides::Both;
         // Without an image the repeat mode has no effect: one batch.
         let repeat = if material.image.is_some() { material.repeat } else { [false; 2] };
-        triangles_of.entry(Look { double_sided, image: material.image, repeat }).or_default().push(triangle);
+        triangles_of
+            .entry(Look {
+                ground,
+                double_sided,
+                has_holes: material.alpha_cutoff.is_some(),
+                image: material.image,
+                repeat,
+            })
+            .or_default()
+            .push(triangle);
     }
     let mut vertices = Vec::with_capacity(3 * scene.material_of.len());
     let mut looks = Vec::with_capacity(triangles_of.len());
@@ -89,6 +125,21 @@ fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Range<u32>
         looks.push((look, first..vertices.len() as u32));
     }
     (vertices, looks)
+}
+
+fn extremes(vertices: &[Vertex], looks: &[(Look, Range<u32>)]) -> Vec<Vec3> {
+    let casters = looks.iter().filter(|(look, _)| !look.ground);
+    let corners: Vec<Vec3> = casters
+        .flat_map(|(_, range)| &vertices[range.start as usize..range.end as usize])
+        .map(|vertex| vertex.p)
+        .collect();
+    let farthest = |direction: &Vec3| {
+        let best = corners.iter().enumerate().max_by(|a, b| a.1.dot(*direction).total_cmp(&b.1.dot(*direction)));
+        best.map(|(index, _)| index)
+    };
+    let directions = LightDomain::Sphere.directions(EXTREME_DIRECTIONS, 0);
+    let found: BTreeSet<usize> = directions.par_iter().filter_map(farthest).collect();
+    found.into_iter().map(|index| corners[index]).collect()
 }
 
 fn triangle_vertices(scene: &Scene, frame: &Frame, triangle: usize) -> [Vertex; 3] {
@@ -151,7 +202,7 @@ fn upload_image(gpu: &Gpu, image: Option<&image::RgbaImage>) -> Result<wgpu::Tex
 
 fn bind(
     gpu: &Gpu,
-    layouts: &Layouts,
+    layout: &wgpu::BindGroupLayout,
     materials: &wgpu::Buffer,
     view: &wgpu::TextureView,
     repeat: [bool; 2],
@@ -164,14 +215,6 @@ fn bind(
         min_filter: wgpu::FilterMode::Linear,
         ..Default::default()
     });
-    let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("material"),
-        layout: &layouts.material,
-        entries: &[
-            entry(0, materials.as_entire_binding()),
-            entry(1, wgpu::BindingResource::TextureView(view)),
-            entry(2, wgpu::BindingResource::Sampler(&sampler)),
-        ],
-    })
+    let view = wgpu::BindingResource::TextureView(view);
+    group(gpu, layout, &[materials.as_entire_binding(), view, wgpu::BindingResource::Sampler(&sampler)])
 }

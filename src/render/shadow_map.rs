@@ -1,0 +1,182 @@
+//! Technique: a shadow map (L. Williams, "Casting Curved Shadows on Curved Surfaces", 1978; C. Everitt, A. Rege, C.
+//! Cebenoyan, "Hardware Shadow Mapping", 2001), with percentage-closer filtering (W. Reeves, D. Salesin, R. Cook,
+//! "Rendering Antialiased Shadows with Depth Maps", 1987), whose kernel is also the technique's soft edge.
+//!
+//! A pass draws the casters' depth from the light, a second one the model. One rule for the bias, whatever the size and
+//! the kernel: the rasteriser adds `kernel` times the triangle's depth slope per texel. A filter of n texels reaches n/2
+//! texels to each side, along both axes: a plane's depth changes by at most n times its slope on the way.
+//!
+//! Not guaranteed: shadows of casters nearer to a receiver than that bias.
+
+use super::{
+    FrameRequest, RenderError,
+    bindings::{COMPARISON, STORAGE, buffer, depth_texture, group, layout},
+    depth_pass::{DepthPass, MAP_FORMAT},
+    forward::{Forward, ForwardOptions},
+    gpu::SHADOW_MAP,
+    light_view::views,
+    stage::{Begin, Part, Stage, Targets},
+    technique::{Cost, Technique},
+};
+use glam::Mat4;
+
+/// Rounding of a depth and of its interpolation, in units of its last place.
+const BIAS_ULPS: i32 = 4;
+
+/// A map and its filter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ShadowMapOptions {
+    /// Width and height of the map (of each face of a point light's cube), 2 to the adapter's limit. Error falls and
+    /// cost grows with it.
+    pub size_texels: u32,
+    /// Texels along a side of the filter, 1 (hard) and up: borders get softer and cost grows with its square.
+    pub kernel_texels: u32,
+}
+
+/// Draws the model with a shadow map.
+#[derive(Debug)]
+pub struct ShadowMap {
+    options: ShadowMapOptions,
+    depth_pass: DepthPass,
+    matrices: wgpu::Buffer,
+    layout: wgpu::BindGroupLayout,
+    sampler: wgpu::Sampler,
+    forward: Forward,
+    map: Option<Map>,
+}
+
+/// The faces of a map: 1, or 6 of a point light.
+#[derive(Debug)]
+struct Map {
+    faces: Vec<wgpu::TextureView>,
+    group: wgpu::BindGroup,
+}
+
+impl ShadowMap {
+    /// For frames of `stage`.
+    ///
+    /// # Errors
+    /// A size beyond the adapter's limits.
+    pub fn new(stage: &Stage, options: ShadowMapOptions) -> Result<Self, RenderError> {
+        let (gpu, kernel) = (&stage.gpu, options.kernel_texels);
+        let (needed, limit) = (u64::from(options.size_texels), u64::from(gpu.limits().max_texture_dimension_2d));
+        if needed > limit {
+            return Err(RenderError::TooLarge { what: "the sides of a shadow map", needed, limit });
+        }
+        let bias = wgpu::DepthBiasState { constant: BIAS_ULPS, slope_scale: kernel as f32, clamp: 0.0 };
+        let fragment = wgpu::ShaderStages::FRAGMENT;
+        let array = depth_texture(wgpu::TextureViewDimension::D2Array);
+        let bindings = [(fragment, STORAGE), (fragment, array), (fragment, COMPARISON)];
+        let layout = layout(gpu, "shadow map", &bindings);
+        let filter = if kernel == 1 { wgpu::FilterMode::Nearest } else { wgpu::FilterMode::Linear };
+        let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("shadow map"),
+            mag_filter: filter,
+            min_filter: filter,
+            compare: Some(wgpu::CompareFunction::LessEqual),
+            ..Default::default()
+        });
+        let constants = vec![("KERNEL", f64::from(kernel))];
+        let forward =
+            Forward::new(stage, &SHADOW_MAP, Some(&layout), ForwardOptions { constants, ..Default::default() });
+        let count = 6 * stage.placements().len();
+        let matrices = buffer::<Mat4>(gpu, "light matrices", count, wgpu::BufferUsages::STORAGE);
+        let depth_pass = DepthPass::new(stage, 6, bias);
+        gpu.check()?;
+        Ok(Self { options, depth_pass, matrices, layout, sampler, forward, map: None })
+    }
+
+    fn make_map(&self, stage: &Stage, count: u32) -> Map {
+        let side = self.options.size_texels;
+        let texture = stage.gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("shadow map"),
+            size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: count },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: MAP_FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
+        let view = |first, count, dimension| {
+            texture.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(dimension),
+                base_array_layer: first,
+                array_layer_count: Some(count),
+                ..Default::default()
+            })
+        };
+        let all = view(0, count, wgpu::TextureViewDimension::D2Array);
+        let group = group(
+            &stage.gpu,
+            &self.layout,
+            &[
+                self.matrices.as_entire_binding(),
+                wgpu::BindingResource::TextureView(&all),
+                wgpu::BindingResource::Sampler(&self.sampler),
+            ],
+        );
+        Map { faces: (0..count).map(|face| view(face, 1, wgpu::TextureViewDimension::D2)).collect(), group }
+    }
+}
+
+impl Technique for ShadowMap {
+    fn name(&self) -> String {
+        let ShadowMapOptions { size_texels, kernel_texels } = self.options;
+        match kernel_texels {
+            1 => format!("shadow map {size_texels}"),
+            n => format!("shadow map {size_texels}, PCF {n}x{n}"),
+        }
+    }
+
+    fn update(
+        &mut self,
+        stage: &Stage,
+        request: &FrameRequest,
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<(), RenderError> {
+        let reach = 0.5 * self.options.kernel_texels as f32;
+        let views = views(stage, &request.light, (self.options.size_texels, reach));
+        let map = match self.map.take() {
+            Some(map) if map.faces.len() == views.len() => map,
+            _ => self.make_map(stage, views.len() as u32),
+        };
+        for (number, (&view, face)) in views.iter().zip(&map.faces).enumerate() {
+            self.depth_pass.record(stage, (number, view), face, encoder);
+        }
+        self.map = Some(map);
+        let of_instance = |placement: &super::stage::Placement| {
+            let world_from_unit = placement.world_from_unit();
+            views.iter().map(move |&view| view * world_from_unit)
+        };
+        let matrices: Vec<Mat4> = stage.placements().iter().flat_map(of_instance).collect();
+        stage.gpu.queue.write_buffer(&self.matrices, 0, bytemuck::cast_slice(&matrices));
+        Ok(())
+    }
+
+    fn draw(
+        &mut self,
+        stage: &Stage,
+        request: &FrameRequest,
+        targets: &Targets,
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<(), RenderError> {
+        let mut pass = targets.begin(encoder, (request.options.mode, Begin::Clear));
+        pass.set_bind_group(2, self.map.as_ref().map(|map| &map.group), &[]);
+        self.forward.draw(stage, request, targets, (&mut pass, Part::All));
+        Ok(())
+    }
+
+    fn cost(&self, stage: &Stage) -> Cost {
+        let faces = self.map.as_ref().map_or(1, |map| map.faces.len());
+        Cost {
+            passes: 1,
+            draw_calls: stage.calls_per_pass(),
+            update_passes: faces,
+            update_draw_calls: faces * stage.calls_per_pass(),
+            texture_bytes: 4 * faces * (self.options.size_texels as usize).pow(2),
+            buffer_bytes: self.matrices.size() as usize + self.depth_pass.buffer_bytes(),
+            on_light_change: "all casters drawn into the map again".to_string(),
+        }
+    }
+}
