@@ -25,6 +25,7 @@ pub mod technique;
 pub mod turntable;
 pub mod unshadowed;
 mod upload;
+pub mod vertex_visibility;
 
 pub use camera::Camera;
 use glam::Vec3;

@@ -5,3 +5,5 @@ mod shadow_map;
 mod stages;
 #[path = "techniques/unshadowed.rs"]
 mod unshadowed;
+#[path = "techniques/vertex_visibility.rs"]
+mod vertex_visibility;

@@ -54,8 +54,11 @@ pub const PLANE_RECTANGLES: Shader = Shader {
 pub const DEPTH: Shader = Shader { name: "depth", parts: parts!["frame.wgsl", "surface.wgsl", "depth.wgsl"] };
 /// The model with a shadow map.
 pub const SHADOW_MAP: Shader = forward!("shadow_map", "shadow_map.wgsl");
+/// The model with visibility precomputed at its vertices.
+pub const VERTEX_VISIBILITY: Shader = forward!("vertex_visibility", "vertex_visibility.wgsl");
 /// All passes.
-pub const SHADERS: &[Shader] = &[CONSTANT_VISIBILITY, OCCLUDER_PLANES, PLANE_CUTS, PLANE_RECTANGLES, DEPTH, SHADOW_MAP];
+pub const SHADERS: &[Shader] =
+    &[CONSTANT_VISIBILITY, OCCLUDER_PLANES, PLANE_CUTS, PLANE_RECTANGLES, DEPTH, SHADOW_MAP, VERTEX_VISIBILITY];
 
 /// Features that some technique uses, asked for where the adapter has them.
 const WANTED: wgpu::Features = wgpu::Features::DEPTH_CLIP_CONTROL
