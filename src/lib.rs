@@ -4,6 +4,7 @@
 pub mod ablation;
 pub mod asset;
 pub mod cli;
+pub mod comparison;
 pub mod effort;
 mod fitting;
 pub mod gltf_file;

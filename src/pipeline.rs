@@ -41,6 +41,7 @@ pub(crate) enum Purpose {
     Image,
     Pilot,
     Directions,
+    Comparison,
 }
 
 /// One fit.
@@ -336,7 +337,7 @@ pub fn write_png(path: &Path, picture: &image::RgbaImage) -> Result<(), FitError
     Ok(batch.commit()?)
 }
 
-fn png(picture: &image::RgbaImage) -> Result<Vec<u8>, image::ImageError> {
+pub(crate) fn png(picture: &image::RgbaImage) -> Result<Vec<u8>, image::ImageError> {
     let mut out = Cursor::new(Vec::new());
     picture.write_to(&mut out, image::ImageFormat::Png)?;
     Ok(out.into_inner())

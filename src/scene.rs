@@ -24,6 +24,7 @@ mod buffers;
 mod document;
 mod extensions;
 mod ground;
+mod instances;
 mod materials;
 mod nodes;
 mod primitive;

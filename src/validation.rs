@@ -120,6 +120,17 @@ impl<'a> Renderer<'a> {
     }
 }
 
+/// `count` views around a model, in turn from above, below and level.
+#[must_use]
+pub fn turntable_views(count: usize) -> Vec<Camera> {
+    let view = |view: usize| {
+        let azimuth_deg = 360.0 * (view as f32 + 0.35) / count as f32;
+        let elevation_deg = ELEVATIONS_DEG[view % ELEVATIONS_DEG.len()];
+        Camera::turntable(azimuth_deg.to_radians(), elevation_deg.to_radians())
+    };
+    (0..count).map(view).collect()
+}
+
 /// Renders and compares. `lights` are unit directions towards the light, the worst first; as many as the options
 /// ask for are used.
 ///
@@ -135,10 +146,7 @@ pub fn validate(
     let size_px = [options.size_px; 2];
     let (mut total, mut flips, mut worst) = (MaskErrors::default(), Vec::new(), None);
     let lights = &lights[..options.lights.min(lights.len())];
-    for view in 0..options.views {
-        let azimuth_deg = 360.0 * (view as f32 + 0.35) / options.views as f32;
-        let elevation_deg = ELEVATIONS_DEG[view % ELEVATIONS_DEG.len()];
-        let camera = Camera::turntable(azimuth_deg.to_radians(), elevation_deg.to_radians());
+    for camera in turntable_views(options.views) {
         let primary = Primary::trace(mesh, &camera, size_px, Antialias::Off)?;
         for (index, &to_light) in lights.iter().enumerate() {
             let light = Light::Directional { to_light };

@@ -160,6 +160,13 @@ impl Gpu {
         }
     }
 
+    /// Waits for the device to end its work.
+    pub(crate) fn wait(&self) -> Result<(), RenderError> {
+        let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
+        waited.map_err(|error| RenderError::Driver { reason: error.to_string() })?;
+        self.check()
+    }
+
     /// Submits `commands` and waits until `readback` holds the picture that they copy there.
     pub(crate) fn submit_and_read(
         &self,
@@ -170,7 +177,7 @@ impl Gpu {
         self.check()?;
         let driver = |reason: String| RenderError::Driver { reason };
         readback.buffer.map_async(wgpu::MapMode::Read, .., |_| ());
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| driver(error.to_string()))?;
+        self.wait()?;
         let picture = {
             let bytes = readback.buffer.get_mapped_range(..).map_err(|error| driver(error.to_string()))?;
             readback.picture(&bytes)

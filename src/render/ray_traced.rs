@@ -69,6 +69,14 @@ pub struct View {
     light: Light,
 }
 
+impl View {
+    /// Pixels of the frame.
+    #[must_use]
+    pub fn pixels(&self) -> usize {
+        self.primary.hits().len()
+    }
+}
+
 impl RayTraced {
     /// Builds the BVH. `world` is the frame of world space: `p_model = centre + radius * p_world`.
     ///

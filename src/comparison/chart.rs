@@ -1,0 +1,51 @@
+//! Speed against error, each technique a series: an SVG.
+
+use super::{
+    Comparison,
+    bench::World,
+    catalogue::{Against, Family},
+};
+use kuva::{
+    backend::svg::SvgBackend,
+    plot::{ScatterPlot, scatter::MarkerShape},
+    render::{layout::Layout, plots::Plot, render::render_multiple},
+};
+
+/// Okabe and Ito, "Color Universal Design" (2008), for series in turn; shapes tell those apart that share one.
+const COLORS: [&str; 7] = ["#000000", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+
+/// The chart of hard self-shadows under a moving light.
+pub(super) fn svg(comparison: &Comparison) -> String {
+    let mut families: Vec<Family> = comparison.rows.iter().map(|row| row.family).collect();
+    families.dedup();
+    let mut plots = Vec::new();
+    for (i, family) in families.into_iter().enumerate() {
+        let rows = || {
+            let shown = |world: World, against| world != World::Ground && against == Against::Hard;
+            comparison
+                .rows
+                .iter()
+                .filter(move |row| row.family == family && shown(row.world, row.against) && row.errors.mask_error > 0.0)
+        };
+        if rows().next().is_none() {
+            continue;
+        }
+        let shapes = [MarkerShape::Circle, MarkerShape::Square, MarkerShape::Triangle];
+        let series = ScatterPlot::new()
+            .with_data(rows().map(|row| (row.times.moving, row.errors.mask_error)))
+            .with_labels(rows().map(|row| row.technique.clone()))
+            .with_repel_labels()
+            .with_color(COLORS[i % COLORS.len()])
+            .with_marker(shapes[i / COLORS.len() % shapes.len()])
+            .with_size(5.0);
+        plots.push(Plot::Scatter(series));
+    }
+    let layout = Layout::auto_from_plots(&plots)
+        .with_title(format!("{}: speed against error", comparison.model))
+        .with_x_label("frame time under a moving light, against no shadows")
+        .with_y_label("wrong share of the pixels")
+        .with_width(1100.0)
+        .with_height(760.0)
+        .with_log_scale();
+    SvgBackend.render_scene(&render_multiple(plots, layout))
+}

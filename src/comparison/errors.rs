@@ -1,0 +1,163 @@
+//! How wrong each technique is, and how it looks.
+
+use super::{
+    CompareOptions,
+    bench::{Bench, World},
+    catalogue::{Against, Setting, draw},
+};
+use crate::{
+    masks::{MaskErrors, difference, mean_flip, side_by_side},
+    pipeline::FitError,
+    render::{
+        Light, Mode, RenderError,
+        ray_traced::{AreaLight, RayTraced, View},
+    },
+};
+use image::RgbaImage;
+use serde::Serialize;
+
+/// Half the angle under which the soft references' light is seen: four times the sun's, so that penumbrae cover pixels.
+pub(super) const SOFT_HALF_ANGLE_RAD: f32 = 0.02;
+
+/// Samples a side of the soft references' light.
+const SOFT_SAMPLES: usize = 8;
+
+/// Errors of one setting; shares of the pixels that count.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Errors {
+    /// Wrong share.
+    pub mask_error: f64,
+    /// The part that lacks shadow.
+    pub missed: f64,
+    /// The part that has too much.
+    #[serde(rename = "false")]
+    pub false_: f64,
+    /// Mean FLIP of the shaded frames of the first light; `null` without the cargo feature `flip`.
+    pub flip_mean: Option<f64>,
+    /// Frames.
+    pub frames: usize,
+}
+
+/// A technique's picture.
+pub(super) struct Picture {
+    pub name: String,
+    pub picture: RgbaImage,
+}
+
+/// Sums of one setting.
+#[derive(Clone, Default)]
+struct Sums {
+    masks: MaskErrors,
+    flips: Vec<f64>,
+    frames: usize,
+}
+
+/// What the settings of a world and a reference are compared with, in one frame.
+struct Reference {
+    mask: RgbaImage,
+    shaded: RgbaImage,
+    /// For each pixel: does it count?
+    counts: Vec<bool>,
+}
+
+/// Errors of all settings, in their order, and pictures of the first frame.
+pub(super) fn measure(
+    bench: &mut Bench,
+    settings: &mut [Setting],
+    options: &CompareOptions,
+    progress: &mut dyn FnMut(String),
+) -> Result<(Vec<Errors>, Vec<Picture>), FitError> {
+    let mut sums = vec![Sums::default(); settings.len()];
+    let mut pictures = Vec::new();
+    for view in 0..options.views {
+        for world in [World::Model, World::Ground] {
+            let seen = bench.traced(world).look(&bench.request(world, (view, 0), Mode::Mask))?;
+            for light in 0..options.lights {
+                progress(format!("errors: view {} of {}, light {}", view + 1, options.views, light + 1));
+                for against in [Against::Hard, Against::Soft] {
+                    let same = |setting: &Setting| {
+                        let is_ground = setting.world == World::Ground;
+                        is_ground == (world == World::Ground) && setting.against == against
+                    };
+                    if !settings.iter().any(same) {
+                        continue;
+                    }
+                    let reference = reference(bench, (world, against), &seen, (view, light))?;
+                    for (setting, sums) in settings.iter_mut().zip(&mut sums).filter(|(setting, _)| same(setting)) {
+                        pictures.extend(compare(bench, setting, sums, (&reference, view, light))?);
+                    }
+                }
+            }
+        }
+    }
+    Ok((sums.iter().map(Sums::errors).collect(), pictures))
+}
+
+impl Sums {
+    fn errors(&self) -> Errors {
+        let Self { masks, flips, frames } = self;
+        Errors {
+            mask_error: masks.share(masks.wrong()),
+            missed: masks.share(masks.missed),
+            false_: masks.share(masks.false_),
+            flip_mean: (!flips.is_empty()).then(|| flips.iter().sum::<f64>() / flips.len() as f64),
+            frames: *frames,
+        }
+    }
+}
+
+fn reference(
+    bench: &Bench,
+    (world, against): (World, Against),
+    seen: &View,
+    frame: (usize, usize),
+) -> Result<Reference, RenderError> {
+    let traced = bench.traced(world);
+    let light = bench.request(world, frame, Mode::Mask).light;
+    let picture = |mode| {
+        let view = RayTraced::relit(seen, mode, light);
+        match (against, light) {
+            (Against::Soft, Light::Directional { to_light }) => {
+                traced.soft_picture(&view, &AreaLight::distant(to_light, SOFT_HALF_ANGLE_RAD), SOFT_SAMPLES)
+            }
+            _ => traced.picture(&view),
+        }
+    };
+    let counts = match world {
+        World::Ground => traced.ground_seen(seen),
+        World::Model | World::Planes(_) => vec![true; seen.pixels()],
+    };
+    Ok(Reference { mask: picture(Mode::Mask)?, shaded: picture(Mode::Shaded)?, counts })
+}
+
+/// Adds a frame's errors; of the first frame also makes the picture.
+fn compare(
+    bench: &mut Bench,
+    setting: &mut Setting,
+    sums: &mut Sums,
+    (reference, view, light): (&Reference, usize, usize),
+) -> Result<Option<Picture>, RenderError> {
+    let world = setting.world;
+    let request = |bench: &Bench, mode| bench.request(world, (view, light), mode);
+    let mask = draw(bench, setting, &request(bench, Mode::Mask))?;
+    let errors = MaskErrors::where_seen(&reference.mask, &mask, |pixel| reference.counts[pixel]);
+    sums.masks = sums.masks.plus(errors);
+    sums.frames += 1;
+    // FLIP takes longer than the frame: one light.
+    if light > 0 {
+        return Ok(None);
+    }
+    let shaded = draw(bench, setting, &request(bench, Mode::Shaded))?;
+    sums.flips.extend(mean_flip(&reference.shaded, &shaded));
+    if view > 0 {
+        return Ok(None);
+    }
+    let pictures = [&reference.shaded, &shaded, &difference(&reference.mask, &mask)];
+    Ok(Some(Picture { name: slug(&setting.name()), picture: side_by_side(&pictures) }))
+}
+
+/// A name as part of a file's name.
+fn slug(name: &str) -> String {
+    let words: Vec<&str> = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty()).collect();
+    words.join("-").to_lowercase()
+}
