@@ -4,6 +4,9 @@
 
 #[allow(dead_code, reason = "each test binary uses its part")]
 mod fits;
+#[path = "techniques/golden.rs"]
+mod golden;
+mod pictures;
 #[path = "techniques/shadow_map.rs"]
 mod shadow_map;
 #[path = "techniques/soft_edges.rs"]

@@ -168,14 +168,15 @@ pub(super) fn settings(bench: &Bench, options: &CompareOptions) -> Result<Vec<Se
     for &family in &options.families {
         let (world, against) = (family.world(), family.against());
         let made = techniques(family, (&bench.stages[world.stage()], bench.traced(world)))?;
-        settings.extend(made.into_iter().map(|technique| Setting { family, world, against, technique, label: None }));
+        let soft = (against == Against::Soft).then_some("soft edge");
+        let setting = |technique| Setting { family, world, against, technique, label: soft.map(str::to_string) };
+        settings.extend(made.into_iter().map(setting));
         for &radius_rad in family.plane_radii_rad() {
             for (set, planes) in bench.planes.iter().enumerate() {
                 let world = World::Planes(set);
                 let technique = OccluderPlanes::soft(&bench.stages[world.stage()], &planes.set, radius_rad)?;
-                let soft = if against == Against::Soft { ", soft edge" } else { "" };
-                let label = Some(format!("{}{soft}", planes.label));
-                settings.push(Setting { family, world, against, technique: Box::new(technique), label });
+                let label = std::iter::once(&*planes.label).chain(soft).collect::<Vec<_>>().join(", ");
+                settings.push(Setting { family, world, against, technique: Box::new(technique), label: Some(label) });
             }
         }
     }

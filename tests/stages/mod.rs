@@ -1,5 +1,6 @@
 //! Closed-form scenes on a stage, drawn by a technique and traced, and the errors between.
 
+use crate::pictures;
 use glam::{DVec3, Vec2, Vec3};
 use shadowfit::{
     masks::MaskErrors,
@@ -69,6 +70,16 @@ pub fn mask(eye: Vec3, target: Vec3, light: Light) -> FrameRequest {
 
 pub fn directional(x: f32, y: f32, z: f32) -> Light {
     Light::Directional { to_light: Vec3::new(x, y, z).normalize() }
+}
+
+/// The golden picture of a technique: its mask of a scene, in tests/golden/techniques. `none` alone may lack shadow.
+pub fn golden(case: &mut Case, technique: &mut dyn Technique, request: &FrameRequest) {
+    let options = FrameOptions { size_px: pictures::SIZE_PX, ..request.options };
+    let frame = case.stage.render(technique, &FrameRequest { options, ..*request }).expect("drawn");
+    let words: Vec<String> = technique.name().split_whitespace().map(|word| word.replace(',', "")).collect();
+    assert!(words == ["none"] || !pictures::shows_too_little_shadow(&frame), "choose another view or light");
+    pictures::check(&format!("techniques/{}", words.join("-")), &frame)
+        .unwrap_or_else(|difference| panic!("{difference}"));
 }
 
 /// Writes a picture that a person may look at to `target/tmp/techniques/`.

@@ -28,7 +28,7 @@ fn technique(case: &Case, options: VertexVisibilityOptions) -> VertexVisibility 
 }
 
 /// The plate of [`plate_over_ground`] over the same ground in `cells` x `cells` squares.
-fn plate_over_tiles(cells: u8) -> Scene {
+pub fn plate_over_tiles(cells: u8) -> Scene {
     let mut scene = empty();
     quad(&mut scene, Vec3::new(-0.4, 0.5, 0.4), Vec3::X * 0.8, Vec3::Z * -0.8);
     let side = 3.0 / f32::from(cells);
