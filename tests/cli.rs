@@ -12,6 +12,8 @@ mod answers;
 mod build;
 #[path = "cli/determinism.rs"]
 mod determinism;
+#[path = "cli/ground.rs"]
+mod ground;
 #[path = "cli/inputs.rs"]
 mod inputs;
 #[path = "cli/kills.rs"]
