@@ -50,6 +50,21 @@ pub struct GroundPlan {
 /// Bytes of all textures where the user names none.
 const TEXTURE_BUDGET: usize = 2 << 20;
 
+/// How planes of a section are searched by default.
+const SECTION_SEARCH: SearchOptions = SearchOptions {
+    max_planes: 16,
+    proposals: 200,
+    screening: SampleSize { lights: 512, pairs: 6_000 },
+    screening_texels: 32,
+    finalists: 8,
+    refined: 2,
+    scoring: SampleSize { lights: 2048, pairs: 24_000 },
+    texels: 48,
+    refine_steps: 4,
+    replace_rounds: 0,
+    seed: 0,
+};
+
 impl Effort {
     /// A first look.
     #[must_use]
@@ -122,24 +137,11 @@ impl Effort {
             },
             ground: GroundPlan { pairs: 1_000_000, search: None },
         };
-        let search = SearchOptions {
-            max_planes: 16,
-            proposals: 200,
-            screening: SampleSize { lights: 512, pairs: 6_000 },
-            screening_texels: 32,
-            finalists: 8,
-            refined: 2,
-            scoring: SampleSize { lights: 2048, pairs: 24_000 },
-            texels: 48,
-            refine_steps: 4,
-            replace_rounds: 0,
-            seed: 0,
-        };
         let divided = Plan {
             sections: 96,
             trace: TraceOptions { pairs: 8_000_000, lights: 2048, stride: 8, exposure_rays: 16, seed: 0 },
             directions: 192,
-            search,
+            search: SECTION_SEARCH,
             min_gain: 3e-6,
             lists: ListOptions { max_lookups: 4, grid: 200, rounds: 2, smoothing: 1 },
             budget: BudgetOptions { byte_gain: 5e-11, smoothing: 1, ..whole.budget },
@@ -150,7 +152,7 @@ impl Effort {
                     finalists: 16,
                     scoring: SampleSize { lights: 1024, pairs: 100_000 },
                     texels: 64,
-                    ..search
+                    ..SECTION_SEARCH
                 }),
             },
         };

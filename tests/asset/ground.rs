@@ -7,7 +7,10 @@ use shadowfit::{
     scene::load,
 };
 use shadowfit_solver::plane::{ActiveLists, BakedSet, Ground};
-use std::path::{Path, PathBuf};
+use std::{
+    f64::consts::FRAC_1_SQRT_2,
+    path::{Path, PathBuf},
+};
 
 const GROUND: Ground = Ground { height: -0.37, half_extent: 1.7 };
 
@@ -94,7 +97,7 @@ fn a_moved_frame_node_moves_the_ground() {
     };
     // A quarter turn around y.
     let turned = moved(
-        json!({"rotation": [0, 0.7071067811865476, 0, 0.7071067811865476], "scale": [2, 3, 8], "translation": [1, 5, 0]}),
+        json!({"rotation": [0, FRAC_1_SQRT_2, 0, FRAC_1_SQRT_2], "scale": [2, 3, 8], "translation": [1, 5, 0]}),
     );
     let after = read(&turned).unwrap().ground.unwrap();
     assert!((after.height - (3.0 * before.height + 5.0)).abs() < 1e-12, "{after:?}");
