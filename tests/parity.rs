@@ -157,7 +157,12 @@ fn sectioned(scene: &mut Scene) -> BakedSet {
     let sections: Vec<Vec<u32>> = (0..7).map(|section| list(section, 1)).collect();
     let directions = vec![Vec3::Y, Vec3::X, Vec3::NEG_X, Vec3::Z];
     let of = |direction: u32| (0..7).map(|section| list(section, 2 + direction)).collect();
-    BakedSet { planes, sections, active: Some(ActiveLists { directions, lists: (0..4).map(of).collect() }) }
+    BakedSet {
+        planes,
+        sections,
+        active: Some(ActiveLists { directions, lists: (0..4).map(of).collect() }),
+        ground: None,
+    }
 }
 
 /// Each section has its shadows, and those of the list that the light picks. A distance field has no grey, so the twins
@@ -221,7 +226,7 @@ fn a_triangle_reads_the_list_of_its_section() {
     let directions = vec![Vec3::Y, Vec3::NEG_Y, Vec3::X];
     let active = ActiveLists { directions, lists: vec![lists(0, 1), lists(1, 0), lists(1, 1)] };
     let sections = vec![vec![0, 1], vec![1, 0], vec![]];
-    let set = BakedSet { planes, sections, active: Some(active) };
+    let set = BakedSet { planes, sections, active: Some(active), ground: None };
     let high = Light::Point { position: Vec3::new(0.1, 0.9, 0.0) };
     for (section, light, is_lit) in [
         (0, directional(0.1, 1.0, 0.0), false),
@@ -256,7 +261,7 @@ fn thousands_of_planes_and_sections_are_drawn() {
     let some = procedural::planes();
     let planes: Vec<BakedPlane> = (0..planes).map(|i| some[i % some.len()].clone()).collect();
     let sections = (0..sections).map(|section| (4 * section..4 * section + 4).collect()).collect();
-    let mut twins = Twins::with(&scene, &mesh, &BakedSet { planes, sections, active: None });
+    let mut twins = Twins::with(&scene, &mesh, &BakedSet { planes, sections, active: None, ground: None });
     let difference = compare(&twins.render(&request(views()[0], directional(0.4, 0.8, 0.5), Mode::Mask)));
     assert!(difference.shadow <= 0.003 && difference.covered > 5_000, "{difference:?}");
 }

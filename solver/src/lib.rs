@@ -10,6 +10,7 @@ pub mod columns;
 pub mod crossing;
 pub mod field;
 pub mod fit;
+pub mod ground;
 pub mod halves;
 pub mod harmonics;
 pub mod importance;
