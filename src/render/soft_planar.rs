@@ -35,7 +35,7 @@ const MOST_SAMPLES: u64 = 2048;
 /// A receiver, a light's extent, and how finely both are sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SoftPlanarOptions {
-    /// Where shadow falls: the scene's ground lies in it.
+    /// Where shadow falls: the ground of the instances lies in it.
     pub receiver: Receiver,
     /// Half the edges of the parallelogram that a point light stands for.
     pub half_edges: [Vec3; 2],

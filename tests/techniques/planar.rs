@@ -76,10 +76,12 @@ fn casters_keep_their_light_where_they_shadow_each_other() {
 fn overlapping_shadows_are_no_darker() {
     let mut case = Case::new(plates_over_ground(&[(Vec3::new(-0.1, 0.3, 0.0), 0.3), (Vec3::new(0.1, 0.6, 0.0), 0.3)]));
     let mut request = mask(EYE, Vec3::ZERO, directional(-0.7, 1.0, -0.6));
+    let (wrong, blocked) = wrong_and_blocked(&mut case, &request, "overlap");
+    assert!(wrong == 0 && blocked > 0.05, "{wrong} {blocked}");
     let ground = case.ground_seen(&request);
     request.options.mode = Mode::Shaded;
     let picture = case.stage.render(&mut planar(&case), &request).expect("drawn");
-    keep(&picture, "planar overlap.png");
+    keep(&picture, "planar overlap shaded.png");
     let colors: BTreeSet<[u8; 4]> = picture.pixels().zip(&ground).filter(|(_, on)| **on).map(|(p, _)| p.0).collect();
     // One material, one direction, one normal: lit and in shadow, but for silhouettes where the two renderers differ.
     assert_eq!(colors.len(), 2, "{colors:?}");
