@@ -7,21 +7,26 @@ override KERNEL: u32;
 // Linear, but nearest where the kernel is 1.
 @group(2) @binding(2) var map_sampler: sampler_comparison;
 
-// Share of the kernel's texels that are not nearer to the light than `depth`.
-fn lit_share(uv: vec2f, face: u32, depth: f32) -> f32 {
-    if KERNEL <= 2u {
-        return textureSampleCompareLevel(map, map_sampler, uv, face, depth);
-    }
-    let texel = 1.0 / vec2f(textureDimensions(map));
-    let first = -0.5 * f32(KERNEL - 2u);
+// Share of the kernel's texels in which the light reaches the fragment's plane: none is nearer to the light there, nor
+// at the fragment.
+fn lit_share(view: InView, slope: vec2f) -> f32 {
+    let size = vec2f(textureDimensions(map));
+    let taps = max(KERNEL, 2u) - 1u;
+    // A tap is one texel, or the four around it.
+    let width = select(1.0, 0.0, KERNEL == 1u);
+    let nearest = dot(min(slope, vec2f(0.0)), vec2f(width)) / size.x;
     var sum = 0.0;
-    for (var y = 0u; y < KERNEL - 1u; y++) {
-        for (var x = 0u; x < KERNEL - 1u; x++) {
-            let at = uv + (first + vec2f(f32(x), f32(y))) * texel;
-            sum += textureSampleCompareLevel(map, map_sampler, at, face, depth);
+    for (var y = 0u; y < taps; y++) {
+        for (var x = 0u; x < taps; x++) {
+            let at = view.uv + (vec2f(f32(x), f32(y)) - 0.5 * f32(taps - 1u)) / size;
+            let first = (floor(at * size - 0.5 * width) + 0.5) / size;
+            let change = dot(slope, first - view.uv) + nearest;
+            // Receivers beyond the last caster are as far as can be.
+            let depth = clamp(view.depth + min(change, 0.0), 0.0, 1.0);
+            sum += textureSampleCompareLevel(map, map_sampler, at, view.face, depth);
         }
     }
-    return sum / f32((KERNEL - 1u) * (KERNEL - 1u));
+    return sum / f32(taps * taps);
 }
 
 fn predicted_visibility(surface: Surface) -> vec3f {
@@ -29,6 +34,5 @@ fn predicted_visibility(surface: Surface) -> vec3f {
     if !view.inside {
         return vec3f(1.0);
     }
-    // Receivers beyond the last caster are as far as can be.
-    return vec3f(lit_share(view.uv, view.face, min(view.depth, 1.0)));
+    return vec3f(lit_share(view, plane_slope(surface, view)));
 }

@@ -10,6 +10,8 @@ mod answers;
 #[allow(dead_code, reason = "shared with tests/scene.rs, which uses more of it")]
 #[path = "scene/build.rs"]
 mod build;
+#[path = "cli/compare.rs"]
+mod compare;
 #[path = "cli/determinism.rs"]
 mod determinism;
 #[path = "cli/inputs.rs"]

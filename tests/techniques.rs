@@ -1,13 +1,24 @@
 //! Each technique against the traced reference on closed-form scenes, with the class of error that is expected of it.
 
+#[path = "techniques/golden.rs"]
+mod golden;
+#[path = "techniques/perspective_shadow_map.rs"]
+mod perspective_shadow_map;
+mod pictures;
 #[path = "techniques/planar.rs"]
 mod planar;
 #[path = "techniques/projective_texture.rs"]
 mod projective_texture;
 #[path = "techniques/shadow_map.rs"]
 mod shadow_map;
+#[path = "techniques/silhouette_map.rs"]
+mod silhouette_map;
 #[path = "techniques/soft_planar.rs"]
 mod soft_planar;
 mod stages;
+#[path = "techniques/stencil_volumes.rs"]
+mod stencil_volumes;
+#[path = "techniques/transparent.rs"]
+mod transparent;
 #[path = "techniques/unshadowed.rs"]
 mod unshadowed;

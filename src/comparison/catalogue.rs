@@ -128,7 +128,9 @@ pub(super) fn settings(bench: &Bench, options: &CompareOptions) -> Result<Vec<Se
     for &family in &options.families {
         let (world, against) = (family.world(), family.against());
         let made = techniques(family, &bench.stages[world.stage()])?;
-        settings.extend(made.into_iter().map(|technique| Setting { family, world, against, technique, label: None }));
+        let label = (against == Against::Soft).then(|| "soft edge".to_string());
+        let setting = |technique| Setting { family, world, against, technique, label: label.clone() };
+        settings.extend(made.into_iter().map(setting));
         if family == Family::Planes {
             for (set, planes) in bench.planes.iter().enumerate() {
                 let world = World::Planes(set);

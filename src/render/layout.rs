@@ -131,6 +131,14 @@ impl Rectangle {
     }
 }
 
+/// `SilhouetteEdge` of silhouette_points.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct SilhouetteEdge {
+    pub a: Vec4,
+    pub b: Vec4,
+}
+
 /// `Material` of surface.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -188,6 +196,7 @@ pub fn struct_layouts() -> Vec<StructLayout> {
         layout!(OccluderSlot { region, layer, channel, encoding }),
         layout!(CastingPlane { a, b, s, slot, bias, side }),
         layout!(Rectangle { origin, u, v, plane, a, b, color, slot }),
+        layout!(SilhouetteEdge { a, b }),
         layout!(Material { base_color, alpha_cutoff, repeat_u, repeat_v }),
     ]
 }

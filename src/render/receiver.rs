@@ -7,7 +7,6 @@
 //! Both have a homogeneous w that is positive on this side of the light only, so that what lies beyond the light is
 //! clipped and never drawn mirrored (an anti-shadow).
 
-use super::Light;
 use crate::scene::Scene;
 use glam::{Mat4, Vec3, Vec4};
 use shadowfit_solver::mesh::Frame;
@@ -75,16 +74,6 @@ impl Receiver {
         let w = flat.row(3);
         let (x, y) = (2.0 * texture.row(0) - w, w - 2.0 * texture.row(1));
         Mat4::from_cols(x, y, w - CUT_APEX * plane, w).transpose()
-    }
-}
-
-impl Light {
-    /// Where it is, homogeneous: w is 0 of a directional light.
-    pub(crate) fn homogeneous(&self) -> Vec4 {
-        match *self {
-            Self::Directional { to_light } => to_light.extend(0.0),
-            Self::Point { position } => position.extend(1.0),
-        }
     }
 }
 

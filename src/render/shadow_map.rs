@@ -55,7 +55,6 @@ impl ShadowMap {
     pub fn new(stage: &Stage, options: ShadowMapOptions) -> Result<Self, RenderError> {
         let (gpu, kernel) = (&stage.gpu, options.kernel_texels);
         LightMap::check_side(gpu, options.size_texels)?;
-        let bias = wgpu::DepthBiasState { constant: BIAS_ULPS, slope_scale: kernel as f32, clamp: 0.0 };
         let fragment = wgpu::ShaderStages::FRAGMENT;
         let array = depth_texture(wgpu::TextureViewDimension::D2Array);
         let bindings = [(fragment, STORAGE), (fragment, array), (fragment, COMPARISON)];
@@ -73,7 +72,7 @@ impl ShadowMap {
             Forward::new(stage, &SHADOW_MAP, Some(&layout), ForwardOptions { constants, ..Default::default() });
         let count = 6 * stage.placements().len();
         let matrices = buffer::<Mat4>(gpu, "light matrices", count, wgpu::BufferUsages::STORAGE);
-        let depth_pass = DepthPass::new(stage, 6, bias);
+        let depth_pass = DepthPass::new(stage, 6, depth_bias(kernel));
         gpu.check()?;
         Ok(Self { options, depth_pass, matrices, layout, sampler, forward, map: None })
     }
@@ -88,6 +87,29 @@ impl ShadowMap {
         let group = group(&stage.gpu, &self.layout, &resources);
         (map, group)
     }
+
+    /// Texels that the filter reaches beyond a lookup.
+    pub(super) fn reach_texels(&self) -> f32 {
+        0.5 * self.options.kernel_texels as f32
+    }
+
+    /// Draws the casters from these views: 1, or 6 of a point light.
+    pub(super) fn redraw(&mut self, stage: &Stage, views: &[Mat4], encoder: &mut wgpu::CommandEncoder) {
+        let map = match self.map.take() {
+            Some(map) if map.0.faces.len() == views.len() => map,
+            _ => self.make_map(stage, views.len() as u32),
+        };
+        for (number, (&view, face)) in views.iter().zip(&map.0.faces).enumerate() {
+            self.depth_pass.record(stage, (number, view), face, encoder);
+        }
+        self.map = Some(map);
+        stage.gpu.queue.write_buffer(&self.matrices, 0, bytemuck::cast_slice(&per_instance(stage, views)));
+    }
+}
+
+/// The rule of the module, for lookups in `kernel_texels` texels a side.
+pub(super) fn depth_bias(kernel_texels: u32) -> wgpu::DepthBiasState {
+    wgpu::DepthBiasState { constant: BIAS_ULPS, slope_scale: kernel_texels as f32, clamp: 0.0 }
 }
 
 impl Technique for ShadowMap {
@@ -105,17 +127,8 @@ impl Technique for ShadowMap {
         request: &FrameRequest,
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), RenderError> {
-        let reach = 0.5 * self.options.kernel_texels as f32;
-        let views = views(stage, &request.light, (self.options.size_texels, reach));
-        let map = match self.map.take() {
-            Some(map) if map.0.faces.len() == views.len() => map,
-            _ => self.make_map(stage, views.len() as u32),
-        };
-        for (number, (&view, face)) in views.iter().zip(&map.0.faces).enumerate() {
-            self.depth_pass.record(stage, (number, view), face, encoder);
-        }
-        self.map = Some(map);
-        stage.gpu.queue.write_buffer(&self.matrices, 0, bytemuck::cast_slice(&per_instance(stage, &views)));
+        let views = views(stage, &request.light, (self.options.size_texels, self.reach_texels()));
+        self.redraw(stage, &views, encoder);
         Ok(())
     }
 

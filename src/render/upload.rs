@@ -23,6 +23,7 @@ use wgpu::util::{DeviceExt, TextureDataOrder};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Look {
     ground: bool,
+    transparent: bool,
     double_sided: bool,
     has_holes: bool,
     image: Option<usize>,
@@ -37,6 +38,8 @@ const EXTREME_DIRECTIONS: usize = 512;
 pub struct Batch {
     /// Of the ground: receives and does not cast.
     pub ground: bool,
+    /// Light passes it ([`Material::transmittance`](crate::scene::Material)).
+    pub transparent: bool,
     /// Both sides are drawn.
     pub double_sided: bool,
     /// Its image cuts holes.
@@ -57,6 +60,8 @@ pub struct Model {
     /// The corners of the casters that lie farthest in some of [`EXTREME_DIRECTIONS`] directions, unit space: what a
     /// light's view must hold.
     pub extremes: Vec<Vec3>,
+    /// The box of all triangles, the ground's too, unit space: least and greatest corner.
+    pub bounds: [Vec3; 2],
 }
 
 impl Model {
@@ -70,6 +75,7 @@ impl Model {
     ) -> Result<Self, RenderError> {
         let (vertices, looks) = vertices(scene, frame);
         let extremes = extremes(&vertices, &looks);
+        let bounds = vertices.iter().fold([Vec3::MAX, Vec3::MIN], |[low, high], v| [low.min(v.p), high.max(v.p)]);
         let bytes: &[u8] = bytemuck::cast_slice(&vertices);
         let limit = gpu.limits().max_buffer_size;
         if bytes.len() as u64 > limit {
@@ -91,10 +97,10 @@ impl Model {
                 }
             };
             let bind_group = bind(gpu, material, &materials, view, look.repeat);
-            let Look { ground, double_sided, has_holes, .. } = look;
-            batches.push(Batch { ground, double_sided, has_holes, bind_group, vertices: range });
+            let Look { ground, transparent, double_sided, has_holes, .. } = look;
+            batches.push(Batch { ground, transparent, double_sided, has_holes, bind_group, vertices: range });
         }
-        Ok(Self { vertices, batches, extremes })
+        Ok(Self { vertices, batches, extremes, bounds })
     }
 }
 
@@ -109,6 +115,7 @@ fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Range<u32>
         triangles_of
             .entry(Look {
                 ground,
+                transparent: material.transmittance.is_some(),
                 double_sided,
                 has_holes: material.alpha_cutoff.is_some(),
                 image: material.image,

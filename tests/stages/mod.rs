@@ -1,5 +1,6 @@
 //! Closed-form scenes on a stage, drawn by a technique and traced, and the errors between.
 
+use crate::pictures;
 use glam::{DVec3, Vec2, Vec3};
 use shadowfit::{
     masks::MaskErrors,
@@ -31,12 +32,21 @@ pub fn gpu() -> &'static Gpu {
 pub struct Case {
     pub stage: Stage,
     pub traced: RayTraced,
-    world: Frame,
+    /// Where world space lies in model space.
+    pub world: Frame,
 }
 
 impl Case {
     pub fn new(scene: Scene) -> Self {
         Self::in_world(scene, WORLD)
+    }
+
+    /// A committed model; world space is its unit space.
+    pub fn of_model(model: &str) -> Self {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("models").join(model);
+        let scene = shadowfit::scene::load(&path).expect("a model");
+        let world = Mesh::new(&scene.soup).expect("triangles").frame;
+        Self::in_world(scene, world)
     }
 
     /// A committed model on a ground of half extent 2; world space is the model's unit space.
@@ -119,6 +129,16 @@ pub fn directional(x: f32, y: f32, z: f32) -> Light {
     Light::Directional { to_light: Vec3::new(x, y, z).normalize() }
 }
 
+/// The golden picture of a technique: its mask of a scene, in tests/golden/techniques. `none` alone may lack shadow.
+pub fn golden(case: &mut Case, technique: &mut dyn Technique, request: &FrameRequest) {
+    let options = FrameOptions { size_px: pictures::SIZE_PX, ..request.options };
+    let frame = case.stage.render(technique, &FrameRequest { options, ..*request }).expect("drawn");
+    let words: Vec<String> = technique.name().split_whitespace().map(|word| word.replace(',', "")).collect();
+    assert!(words == ["none"] || !pictures::shows_too_little_shadow(&frame), "choose another view or light");
+    pictures::check(&format!("techniques/{}", words.join("-")), &frame)
+        .unwrap_or_else(|difference| panic!("{difference}"));
+}
+
 /// Writes a picture that a person may look at to `target/tmp/techniques/`.
 pub fn keep(picture: &image::RgbaImage, name: &str) {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("techniques");
@@ -128,7 +148,8 @@ pub fn keep(picture: &image::RgbaImage, name: &str) {
 
 /// An empty scene with one white material.
 pub fn empty() -> Scene {
-    let white = Material { base_color: [1.0; 4], image: None, repeat: [false; 2], alpha_cutoff: None };
+    let white =
+        Material { base_color: [1.0; 4], image: None, repeat: [false; 2], alpha_cutoff: None, transmittance: None };
     Scene { materials: vec![white], ..Scene::default() }
 }
 
