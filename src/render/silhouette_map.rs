@@ -144,8 +144,9 @@ impl Technique for SilhouetteMap {
             update_draw_calls: faces * (stage.calls_per_pass() + 1),
             texture_bytes: TEXEL_BYTES * texels + self.points.texture_bytes(),
             buffer_bytes: buffers.iter().sum(),
-            on_light_change: "all casters drawn into the map again; each instance's silhouette found on the CPU and drawn"
-                .to_string(),
+            on_light_change:
+                "all casters drawn into the map again; each instance's silhouette found on the CPU and drawn"
+                    .to_string(),
         }
     }
 }

@@ -2,12 +2,18 @@
 
 use crate::stages::{Case, WORLD, box_on_ground, directional, golden, mask};
 use glam::Vec3;
-use shadowfit::render::{
-    FrameRequest,
-    shadow_map::{ShadowMap, ShadowMapOptions},
-    stencil_volumes::{Counting, StencilVolumes},
-    transparent::{Accumulation, TransparentVolumes},
-    unshadowed::Unshadowed,
+use shadowfit::{
+    render::{
+        FrameRequest,
+        planar::{Planar, PlanarOptions},
+        projective_texture::{ProjectiveTexture, ProjectiveTextureOptions},
+        shadow_map::{ShadowMap, ShadowMapOptions},
+        soft_planar::{SoftPlanar, SoftPlanarOptions},
+        stencil_volumes::{Counting, StencilVolumes},
+        transparent::{Accumulation, TransparentVolumes},
+        unshadowed::Unshadowed,
+    },
+    scene::Scene,
 };
 
 /// The frame of all pictures.
@@ -50,5 +56,35 @@ fn transparent_volumes() {
     let mut case = Case::new(scene);
     let added = Accumulation::Logarithms;
     let mut technique = TransparentVolumes::new(&case.stage, case.traced.scene(), &WORLD, added).expect("it fits");
+    golden(&mut case, &mut technique, &request());
+}
+
+/// The last two triangles are a ground: it receives and does not cast.
+fn box_and_its_ground() -> Case {
+    Case::new(Scene { ground_triangles: 2, ..box_on_ground() })
+}
+
+#[test]
+fn planar() {
+    let mut case = box_and_its_ground();
+    let mut technique = Planar::new(&case.stage, PlanarOptions { receiver: case.receiver() });
+    golden(&mut case, &mut technique, &request());
+}
+
+#[test]
+fn projective_texture() {
+    let mut case = box_and_its_ground();
+    let options = ProjectiveTextureOptions { size_texels: 256 };
+    let mut technique = ProjectiveTexture::new(&case.stage, options).expect("it fits");
+    golden(&mut case, &mut technique, &request());
+}
+
+#[test]
+fn soft_planar() {
+    let mut case = box_and_its_ground();
+    let half_edges = [Vec3::X * 0.2, Vec3::Z * 0.2];
+    let options =
+        SoftPlanarOptions { receiver: case.receiver(), half_edges, half_angle_rad: 0.2, side: 4, size_texels: 256 };
+    let mut technique = SoftPlanar::new(&case.stage, options).expect("it fits");
     golden(&mut case, &mut technique, &request());
 }

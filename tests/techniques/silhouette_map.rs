@@ -140,8 +140,7 @@ fn a_point_light_has_six_faces() {
     let mut case = Case::new(box_on_ground());
     for position in [Vec3::new(0.6, 0.9, 0.3), Vec3::new(-0.9, 0.4, 0.1), Vec3::new(0.0, 0.8, -0.7)] {
         let request = mask(Vec3::new(1.5, 2.5, 2.0), Vec3::ZERO, Light::Point { position });
-        let [plain, silhouette] =
-            maps(&case, &WORLD, 128).map(|mut technique| case.errors(&mut *technique, &request));
+        let [plain, silhouette] = maps(&case, &WORLD, 128).map(|mut technique| case.errors(&mut *technique, &request));
         eprintln!("point {position}: shadow map {plain:?}, silhouette map {silhouette:?}");
     }
 }
