@@ -181,6 +181,9 @@ struct RenderArgs {
     /// Where the light is, seen from the model: azimuth (0 = +Z, 90 = +X) and elevation, degrees.
     #[arg(long, value_name = "AZ,EL", default_value = "35,40", value_parser = angles, allow_hyphen_values = true)]
     light: [f32; 2],
+    /// Angular radius of the light, degrees: soft edges, 0 for hard ones. The sun has 0.27.
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = radius)]
+    light_radius: f32,
     /// Where the camera is, seen from the model: azimuth and elevation, degrees.
     #[arg(long, value_name = "AZ,EL", default_value = "30,20", value_parser = angles, allow_hyphen_values = true)]
     view: [f32; 2],
@@ -259,6 +262,17 @@ fn angles(text: &str) -> Result<[f32; 2], String> {
             Ok([az.to_radians(), el.to_radians()])
         }
         _ => Err("AZIMUTH,ELEVATION in degrees is needed, elevation from -90 to 90".to_string()),
+    }
+}
+
+/// Most degrees of a light's radius: beyond, no border is left that could be soft.
+const MAX_LIGHT_RADIUS_DEG: f32 = 45.0;
+
+/// Degrees from 0 to [`MAX_LIGHT_RADIUS_DEG`].
+fn radius(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(degrees) if (0.0..=MAX_LIGHT_RADIUS_DEG).contains(&degrees) => Ok(degrees),
+        _ => Err(format!("degrees from 0 to {MAX_LIGHT_RADIUS_DEG} are needed")),
     }
 }
 
@@ -440,16 +454,17 @@ fn render(args: &RenderArgs) -> Result<(), CliError> {
         light: Light::Directional { to_light: direction(args.light[0], args.light[1]) },
         options: FrameOptions { size_px: [args.size; 2], mode, antialias },
     };
+    let light_radius_rad = args.light_radius.to_radians();
     let on_gpu = || {
         let mut turntable = turntable::Turntable::new(&Gpu::new()?, &scene, &mesh.frame)?;
-        turntable.set_planes(&set)?;
+        turntable.set_soft_planes(&set, light_radius_rad)?;
         turntable.render(&request)
     };
     let picture = match on_gpu() {
         Err(RenderError::NoAdapter | RenderError::Device { .. } | RenderError::TooLarge { .. }) => {
             tracing::warn!("no graphics adapter can draw this: drawing with the CPU");
             let mut turntable = cpu::Turntable::new(&scene, &mesh);
-            turntable.set_planes(&set);
+            turntable.set_soft_planes(&set, light_radius_rad);
             turntable.render(&request)
         }
         outcome => outcome,

@@ -38,6 +38,7 @@ pub mod transparent;
 pub mod turntable;
 pub mod unshadowed;
 mod upload;
+pub mod vertex_visibility;
 mod view_matrices;
 pub mod volume;
 mod volume_pass;

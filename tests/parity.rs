@@ -187,6 +187,32 @@ fn sections_agree_under_all_lights() {
     assert!(changed > 10_000, "the lists change too little to test anything: {changed}");
 }
 
+/// Under lights of some size values between light and shadow are many: their mean counts. Point lights stay hard.
+#[test]
+fn soft_edges_agree_under_all_lights() {
+    let mut scene = procedural::scene();
+    let set = sectioned(&mut scene);
+    let mesh = mesh_of(&scene);
+    let mut twins = Twins::with(&scene, &mesh, &set);
+    let hard: Vec<RgbaImage> = lights(&set.planes)
+        .into_iter()
+        .map(|light| twins.gpu.render(&request(views()[1], light, Mode::Mask)).expect("drawn"))
+        .collect();
+    let light_radius_rad = 0.05;
+    twins.gpu.set_soft_planes(&set, light_radius_rad).expect("the planes fit");
+    twins.cpu.set_soft_planes(&set, light_radius_rad);
+    for (light, hard) in lights(&set.planes).into_iter().zip(hard) {
+        let frames = twins.render(&request(views()[1], light, Mode::Mask));
+        let difference = compare(&frames);
+        assert!(difference.shadow <= 0.003 && difference.mean <= 0.5, "{light:?}: {difference:?}");
+        let changed = frames[0].pixels().zip(hard.pixels()).filter(|(p, q)| p != q).count();
+        match light {
+            Light::Directional { .. } => assert!(changed > 300, "{light:?}: {changed}"),
+            Light::Point { .. } => assert_eq!(changed, 0),
+        }
+    }
+}
+
 /// Shadow where the section has the plane, none where it has another or the triangle has no section.
 #[test]
 fn a_triangle_reads_the_list_of_its_section() {

@@ -64,6 +64,13 @@ pub enum Encoding {
 /// The value 0..1 at which a distance field begins to block: a byte of 128 does, one of 127 does not.
 pub const SDF_BORDER: f32 = 0.5;
 
+/// How many texels the values of a distance field span on either side of a border: fewer, and bilinear interpolation
+/// cannot place it; more, and bytes are too coarse. Soft edges reach as far and no farther.
+pub const SDF_TEXELS: f32 = 2.0;
+
+/// What a distance field rises by from texel to texel towards a border.
+pub const SDF_PER_TEXEL: f32 = SDF_BORDER / SDF_TEXELS;
+
 /// What a rectangle blocks. The outermost ring of texels is open: 0 as coverage, below 128 in a distance field.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct OccluderTexture {

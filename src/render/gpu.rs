@@ -75,6 +75,8 @@ pub const TRANSPARENT_VOLUMES: Shader =
     Shader { name: "transparent_volumes", parts: parts!["frame.wgsl", "volumes.wgsl", "transparent_volumes.wgsl"] };
 /// The model in the light that these leave.
 pub const TRANSPARENT: Shader = forward!("transparent", "transparent.wgsl");
+/// The model with visibility precomputed at its vertices.
+pub const VERTEX_VISIBILITY: Shader = forward!("vertex_visibility", "vertex_visibility.wgsl");
 /// All passes.
 pub const SHADERS: &[Shader] = &[
     CONSTANT_VISIBILITY,
@@ -92,6 +94,7 @@ pub const SHADERS: &[Shader] = &[
     SILHOUETTE_MAP,
     TRANSPARENT_VOLUMES,
     TRANSPARENT,
+    VERTEX_VISIBILITY,
 ];
 
 /// Features that some technique uses, asked for where the adapter has them.

@@ -21,10 +21,11 @@ use wgpu::util::{DeviceExt, TextureDataOrder};
 
 /// What a draw has in common: cull mode and textures. The order of the draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Look {
+pub struct Look {
     ground: bool,
     transparent: bool,
-    double_sided: bool,
+    /// Both sides are drawn.
+    pub double_sided: bool,
     has_holes: bool,
     image: Option<usize>,
     repeat: [bool; 2],
@@ -104,7 +105,8 @@ impl Model {
     }
 }
 
-fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Range<u32>)>) {
+/// The vertices in the order of [`Model::vertices`], three a triangle, in the unit space of `frame`, and what they draw.
+pub fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Range<u32>)>) {
     let mut triangles_of: BTreeMap<Look, Vec<usize>> = BTreeMap::new();
     for (triangle, &material) in scene.material_of.iter().enumerate() {
         let material = &scene.materials[material as usize];

@@ -1,19 +1,17 @@
 //! The picture of each technique on one scene: a box on a ground, under a light from the side.
 
-use crate::stages::{Case, WORLD, box_on_ground, directional, golden, mask};
+use crate::{
+    stages::{Case, WORLD, box_on_ground, directional, golden, mask},
+    vertex_visibility::plate_over_tiles,
+};
 use glam::Vec3;
-use shadowfit::{
-    render::{
-        FrameRequest,
-        planar::{Planar, PlanarOptions},
-        projective_texture::{ProjectiveTexture, ProjectiveTextureOptions},
-        shadow_map::{ShadowMap, ShadowMapOptions},
-        soft_planar::{SoftPlanar, SoftPlanarOptions},
-        stencil_volumes::{Counting, StencilVolumes},
-        transparent::{Accumulation, TransparentVolumes},
-        unshadowed::Unshadowed,
-    },
-    scene::Scene,
+use shadowfit::render::{
+    FrameRequest,
+    shadow_map::{ShadowMap, ShadowMapOptions},
+    stencil_volumes::{Counting, StencilVolumes},
+    transparent::{Accumulation, TransparentVolumes},
+    unshadowed::Unshadowed,
+    vertex_visibility::{VertexVisibility, VertexVisibilityOptions},
 };
 
 /// The frame of all pictures.
@@ -59,32 +57,12 @@ fn transparent_volumes() {
     golden(&mut case, &mut technique, &request());
 }
 
-/// The last two triangles are a ground: it receives and does not cast.
-fn box_and_its_ground() -> Case {
-    Case::new(Scene { ground_triangles: 2, ..box_on_ground() })
-}
-
+/// On a ground that has vertices.
 #[test]
-fn planar() {
-    let mut case = box_and_its_ground();
-    let mut technique = Planar::new(&case.stage, PlanarOptions { receiver: case.receiver() });
-    golden(&mut case, &mut technique, &request());
-}
-
-#[test]
-fn projective_texture() {
-    let mut case = box_and_its_ground();
-    let options = ProjectiveTextureOptions { size_texels: 256 };
-    let mut technique = ProjectiveTexture::new(&case.stage, options).expect("it fits");
-    golden(&mut case, &mut technique, &request());
-}
-
-#[test]
-fn soft_planar() {
-    let mut case = box_and_its_ground();
-    let half_edges = [Vec3::X * 0.2, Vec3::Z * 0.2];
-    let options =
-        SoftPlanarOptions { receiver: case.receiver(), half_edges, half_angle_rad: 0.2, side: 4, size_texels: 256 };
-    let mut technique = SoftPlanar::new(&case.stage, options).expect("it fits");
+fn vertex_visibility() {
+    let mut case = Case::new(plate_over_tiles(24));
+    let models = (case.traced.scene(), case.traced.mesh());
+    let mut technique =
+        VertexVisibility::new(&case.stage, models, VertexVisibilityOptions::default()).expect("it fits");
     golden(&mut case, &mut technique, &request());
 }

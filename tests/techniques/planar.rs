@@ -1,9 +1,12 @@
 //! Planar shadows: exact on the ground but for the pixels of borders, whatever the light and wherever casters lie; none on
 //! the casters themselves.
 
-use crate::stages::{
-    Case, WORLD, directional, empty, gpu, ground, ground_errors, keep, mask, plates_over_ground, quad,
-    wrong_off_borders,
+use crate::{
+    golden,
+    stages::{
+        Case, WORLD, directional, empty, golden as compare, gpu, ground, ground_errors, keep, mask, plates_over_ground,
+        quad, wrong_off_borders,
+    },
 };
 use glam::{Quat, Vec2, Vec3};
 use shadowfit::{
@@ -228,4 +231,11 @@ fn borders_are_antialiased() {
     let drawn = case.stage.render(&mut planar(&case), &request).expect("drawn");
     let grey = drawn.pixels().filter(|p| p.0[1] == 255 && (1..255).contains(&p.0[0])).count();
     assert!(missed + falsely < 5e-4 && grey > 50, "{missed} {falsely}, {grey} grey pixels");
+}
+
+#[test]
+fn golden_picture() {
+    let mut case = Case::of_box_on_its_ground();
+    let mut technique = planar(&case);
+    compare(&mut case, &mut technique, &golden::request());
 }

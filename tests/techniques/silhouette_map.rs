@@ -11,9 +11,9 @@ use shadowfit::{
         silhouette_map::SilhouetteMap,
         technique::Technique,
     },
-    scene::{Scene, load},
+    scene::Scene,
 };
-use shadowfit_solver::mesh::{Frame, Mesh};
+use shadowfit_solver::mesh::Frame;
 
 /// A shadow map and a silhouette map of equal size.
 fn maps(case: &Case, frame: &Frame, size_texels: u32) -> [Box<dyn Technique>; 2] {
@@ -111,7 +111,7 @@ fn a_teapot_is_no_worse_than_with_a_shadow_map() {
             for eye in [Vec3::new(1.5, 1.4, 2.0), Vec3::new(-2.2, 0.9, 1.0)] {
                 let mut request = mask(eye, Vec3::ZERO, light);
                 request.options.size_px = [512, 512];
-                let [a, b] = maps(&case, &frame, size).map(|mut technique| case.errors(&mut *technique, &request));
+                let [a, b] = maps(&case, &case.world, size).map(|mut technique| case.errors(&mut *technique, &request));
                 for i in 0..2 {
                     plain[i] += a[i] / 6.0;
                     silhouette[i] += b[i] / 6.0;
