@@ -78,6 +78,18 @@ pub(crate) enum Part {
     Transparent,
 }
 
+impl Part {
+    fn holds(self, batch: &Batch) -> bool {
+        match self {
+            Self::All => true,
+            Self::Casters => !batch.ground,
+            Self::Ground => batch.ground,
+            Self::Opaque => !batch.transparent,
+            Self::Transparent => batch.transparent,
+        }
+    }
+}
+
 /// The bind group layouts of all techniques: group 0 is the frame, group 1 a material; group 2 is the technique's own.
 #[derive(Clone, Debug)]
 pub(crate) struct Layouts {
@@ -143,14 +155,19 @@ impl Stage {
         &self.placements
     }
 
-    /// Draw calls of a pass over all casters.
+    /// Draw calls of a pass over everything.
     #[must_use]
     pub fn calls_per_pass(&self) -> usize {
+        self.calls_of(Part::All)
+    }
+
+    /// Draw calls of a pass over a part.
+    pub(crate) fn calls_of(&self, part: Part) -> usize {
         let calls = match self.draw_calls {
             DrawCalls::Instanced => 1,
             DrawCalls::OnePerInstance => self.placements.len(),
         };
-        calls * self.model.batches.len()
+        calls * self.model.batches.iter().filter(|batch| part.holds(batch)).count()
     }
 
     /// Does light pass some of the triangles?
@@ -233,14 +250,7 @@ impl Stage {
         part: Part,
         pipeline: impl Fn(&Batch) -> &'p wgpu::RenderPipeline,
     ) {
-        let drawn = |batch: &&Batch| match part {
-            Part::All => true,
-            Part::Casters => !batch.ground,
-            Part::Ground => batch.ground,
-            Part::Opaque => !batch.transparent,
-            Part::Transparent => batch.transparent,
-        };
-        for batch in self.model.batches.iter().filter(drawn) {
+        for batch in self.model.batches.iter().filter(|batch| part.holds(batch)) {
             pass.set_pipeline(pipeline(batch));
             pass.set_bind_group(1, &batch.bind_group, &[]);
             let count = self.placements.len() as u32;

@@ -21,10 +21,11 @@ use wgpu::util::{DeviceExt, TextureDataOrder};
 
 /// What a draw has in common: cull mode and textures. The order of the draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Look {
+pub struct Look {
     ground: bool,
     transparent: bool,
-    double_sided: bool,
+    /// Both sides are drawn.
+    pub double_sided: bool,
     has_holes: bool,
     image: Option<usize>,
     repeat: [bool; 2],
@@ -60,6 +61,8 @@ pub struct Model {
     /// The corners of the casters that lie farthest in some of [`EXTREME_DIRECTIONS`] directions, unit space: what a
     /// light's view must hold.
     pub extremes: Vec<Vec3>,
+    /// The box of all triangles, the ground's too, unit space: least and greatest corner.
+    pub bounds: [Vec3; 2],
 }
 
 impl Model {
@@ -73,6 +76,7 @@ impl Model {
     ) -> Result<Self, RenderError> {
         let (vertices, looks) = vertices(scene, frame);
         let extremes = extremes(&vertices, &looks);
+        let bounds = vertices.iter().fold([Vec3::MAX, Vec3::MIN], |[low, high], v| [low.min(v.p), high.max(v.p)]);
         let bytes: &[u8] = bytemuck::cast_slice(&vertices);
         let limit = gpu.limits().max_buffer_size;
         if bytes.len() as u64 > limit {
@@ -97,11 +101,12 @@ impl Model {
             let Look { ground, transparent, double_sided, has_holes, .. } = look;
             batches.push(Batch { ground, transparent, double_sided, has_holes, bind_group, vertices: range });
         }
-        Ok(Self { vertices, batches, extremes })
+        Ok(Self { vertices, batches, extremes, bounds })
     }
 }
 
-fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Range<u32>)>) {
+/// The vertices in the order of [`Model::vertices`], three a triangle, in the unit space of `frame`, and what they draw.
+pub fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Range<u32>)>) {
     let mut triangles_of: BTreeMap<Look, Vec<usize>> = BTreeMap::new();
     for (triangle, &material) in scene.material_of.iter().enumerate() {
         let material = &scene.materials[material as usize];

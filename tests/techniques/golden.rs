@@ -1,6 +1,9 @@
 //! The picture of each technique on one scene: a box on a ground, under a light from the side.
 
-use crate::stages::{Case, WORLD, box_on_ground, directional, golden, mask};
+use crate::{
+    stages::{Case, WORLD, box_on_ground, directional, golden, mask},
+    vertex_visibility::plate_over_tiles,
+};
 use glam::Vec3;
 use shadowfit::render::{
     FrameRequest,
@@ -8,6 +11,7 @@ use shadowfit::render::{
     stencil_volumes::{Counting, StencilVolumes},
     transparent::{Accumulation, TransparentVolumes},
     unshadowed::Unshadowed,
+    vertex_visibility::{VertexVisibility, VertexVisibilityOptions},
 };
 
 /// The frame of all pictures.
@@ -50,5 +54,15 @@ fn transparent_volumes() {
     let mut case = Case::new(scene);
     let added = Accumulation::Logarithms;
     let mut technique = TransparentVolumes::new(&case.stage, case.traced.scene(), &WORLD, added).expect("it fits");
+    golden(&mut case, &mut technique, &request());
+}
+
+/// On a ground that has vertices.
+#[test]
+fn vertex_visibility() {
+    let mut case = Case::new(plate_over_tiles(24));
+    let models = (case.traced.scene(), case.traced.mesh());
+    let mut technique =
+        VertexVisibility::new(&case.stage, models, VertexVisibilityOptions::default()).expect("it fits");
     golden(&mut case, &mut technique, &request());
 }
