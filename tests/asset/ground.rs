@@ -96,9 +96,8 @@ fn a_moved_frame_node_moves_the_ground() {
         })
     };
     // A quarter turn around y.
-    let turned = moved(
-        json!({"rotation": [0, FRAC_1_SQRT_2, 0, FRAC_1_SQRT_2], "scale": [2, 3, 8], "translation": [1, 5, 0]}),
-    );
+    let turned =
+        moved(json!({"rotation": [0, FRAC_1_SQRT_2, 0, FRAC_1_SQRT_2], "scale": [2, 3, 8], "translation": [1, 5, 0]}));
     let after = read(&turned).unwrap().ground.unwrap();
     assert!((after.height - (3.0 * before.height + 5.0)).abs() < 1e-12, "{after:?}");
     assert!((after.half_extent - 4.0 * before.half_extent).abs() < 1e-12, "{after:?}");
