@@ -32,7 +32,8 @@ pub fn gpu() -> &'static Gpu {
 pub struct Case {
     pub stage: Stage,
     pub traced: RayTraced,
-    world: Frame,
+    /// Where world space lies in the scene's model space.
+    pub world: Frame,
 }
 
 impl Case {
