@@ -6,6 +6,12 @@ override EDGE_ON: f32;
 // The value from which a distance field blocks; plane::SDF_BORDER.
 override SDF_BORDER: f32;
 
+// What a distance field rises by from texel to texel; plane::SDF_PER_TEXEL.
+override SDF_PER_TEXEL: f32;
+
+// Least spread of a soft edge; shade::MIN_SPREAD.
+override MIN_SPREAD: f32;
+
 // Where an occluder texture lies in the atlas.
 struct OccluderSlot {
     // x, y, width, height in texels.
@@ -27,6 +33,8 @@ struct CastingPlane {
     bias: f32,
     // 0: receivers on both sides, 1: in front, 2: behind. Only point lights ask.
     side: u32,
+    // How fast edges soften with the distance from the plane; only lights of some size ask.
+    softening: f32,
 }
 
 // Texture coordinates of a crossing; `casts` is false where the ray misses the rectangle.
@@ -44,12 +52,16 @@ struct Crossing {
 // stands an empty one for triangles that belong to none.
 @group(2) @binding(3) var<storage, read> lists: array<u32>;
 
+fn on_rectangle(ab: vec2f) -> bool {
+    return all(ab >= vec2f(0.0)) && all(ab <= vec2f(1.0));
+}
+
 // Where the ray from p towards a directional light crosses the plane beyond its bias.
 fn crossing(plane: CastingPlane, p: vec3f) -> Crossing {
     let p1 = vec4f(p, 1.0);
     let ab = vec2f(dot(plane.a, p1), dot(plane.b, p1));
     let s = dot(plane.s, p1);
-    return Crossing(ab, s > plane.bias && all(ab >= vec2f(0.0)) && all(ab <= vec2f(1.0)));
+    return Crossing(ab, s > plane.bias && on_rectangle(ab));
 }
 
 // The same for a point light at c: between p and c, beyond the bias, not edge-on; signs first, then the division.
@@ -66,17 +78,46 @@ fn crossing_point_light(plane: CastingPlane, c: vec3f, p: vec3f) -> Crossing {
     let s = height / n_dot_d;
     let q1 = vec4f(p + s * to_light, 1.0);
     let ab = vec2f(dot(plane.a, q1), dot(plane.b, q1));
-    return Crossing(ab, s * distance > plane.bias && all(ab >= vec2f(0.0)) && all(ab <= vec2f(1.0)));
+    return Crossing(ab, s * distance > plane.bias && on_rectangle(ab));
 }
 
-// How much of the light is blocked, 0..1, at ab in 0..1: the bilinear value, taps clamped to the region; of a distance
-// field, whether that reaches its border.
-fn sample(slot: OccluderSlot, ab: vec2f) -> f32 {
+// The bilinear value at ab in 0..1, taps clamped to the region.
+fn value(slot: OccluderSlot, ab: vec2f) -> f32 {
     let size = slot.region.zw;
     let texel = slot.region.xy + clamp(ab * size, vec2f(0.5), size - 0.5);
     let uv = texel / vec2f(textureDimensions(occluders));
-    let value = textureSampleLevel(occluders, occluder_sampler, uv, slot.layer, 0.0)[slot.channel];
+    return textureSampleLevel(occluders, occluder_sampler, uv, slot.layer, 0.0)[slot.channel];
+}
+
+// How much of the light is blocked, 0..1: the value; of a distance field, whether that reaches its border.
+fn sample(slot: OccluderSlot, ab: vec2f) -> f32 {
+    let value = value(slot, ab);
     return select(value, f32(value >= SDF_BORDER), slot.encoding == 1u);
+}
+
+// The same with soft edges, `spread` to each side in units of a field's value, at any ab: beyond the centres of the
+// outermost texels, and beyond the rectangle, a field goes on falling. The outermost texels are open: nothing is left
+// of them where the field has fallen by the spread.
+fn sample_soft(slot: OccluderSlot, ab: vec2f, spread: f32) -> f32 {
+    if slot.encoding == 0u {
+        return select(0.0, value(slot, ab), on_rectangle(ab));
+    }
+    let at = ab * slot.region.zw;
+    let beyond = distance(at, clamp(at, vec2f(0.5), slot.region.zw - 0.5)) * SDF_PER_TEXEL;
+    if !(beyond < spread) {
+        return 0.0;
+    }
+    return smoothstep(SDF_BORDER - spread, SDF_BORDER + spread, value(slot, ab) - beyond);
+}
+
+// Spread of the edges at distance s from the plane.
+fn spread(softening: f32, s: f32) -> f32 {
+    return clamp(softening * s, MIN_SPREAD, SDF_BORDER);
+}
+
+// Share of a light that stands above the horizon of the surface itself; `sine` is that of the light's angular radius.
+fn horizon(n_dot_l: f32, sine: f32) -> f32 {
+    return smoothstep(-sine, sine, n_dot_l);
 }
 
 // Where the list of a section starts and ends.
@@ -100,7 +141,22 @@ fn visibility(list: vec2u, p: vec3f) -> f32 {
     return v;
 }
 
-// The same under a point light at c.
+// The same with soft edges.
+fn visibility_soft(list: vec2u, p: vec3f) -> f32 {
+    var v = 1.0;
+    for (var i = list.x; i < list.y && v > 0.0; i++) {
+        let plane = lists[i];
+        let p1 = vec4f(p, 1.0);
+        let s = dot(casting[plane].s, p1);
+        if s > casting[plane].bias {
+            let ab = vec2f(dot(casting[plane].a, p1), dot(casting[plane].b, p1));
+            v *= 1.0 - sample_soft(casting[plane].slot, ab, spread(casting[plane].softening, s));
+        }
+    }
+    return v;
+}
+
+// The same as `visibility` under a point light at c.
 fn visibility_point_light(list: vec2u, c: vec3f, p: vec3f) -> f32 {
     var v = 1.0;
     for (var i = list.x; i < list.y && v > 0.0; i++) {

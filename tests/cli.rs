@@ -14,6 +14,8 @@ mod build;
 mod compare;
 #[path = "cli/determinism.rs"]
 mod determinism;
+#[path = "cli/ground.rs"]
+mod ground;
 #[path = "cli/inputs.rs"]
 mod inputs;
 #[path = "cli/kills.rs"]

@@ -70,6 +70,13 @@ pub const SILHOUETTE: Shader =
 pub const PROJECTIVE_TEXTURE: Shader = forward!("projective_texture", "light_views.wgsl", "projective_texture.wgsl");
 /// The ground with a soft shadow.
 pub const SOFT_PLANAR: Shader = forward!("soft_planar", "soft_planar.wgsl");
+/// Shadow volumes into a float target.
+pub const TRANSPARENT_VOLUMES: Shader =
+    Shader { name: "transparent_volumes", parts: parts!["frame.wgsl", "volumes.wgsl", "transparent_volumes.wgsl"] };
+/// The model in the light that these leave.
+pub const TRANSPARENT: Shader = forward!("transparent", "transparent.wgsl");
+/// The model with visibility precomputed at its vertices.
+pub const VERTEX_VISIBILITY: Shader = forward!("vertex_visibility", "vertex_visibility.wgsl");
 /// All passes.
 pub const SHADERS: &[Shader] = &[
     CONSTANT_VISIBILITY,
@@ -85,6 +92,9 @@ pub const SHADERS: &[Shader] = &[
     STENCIL_VOLUMES,
     SILHOUETTE_POINTS,
     SILHOUETTE_MAP,
+    TRANSPARENT_VOLUMES,
+    TRANSPARENT,
+    VERTEX_VISIBILITY,
 ];
 
 /// Features that some technique uses, asked for where the adapter has them.

@@ -61,30 +61,34 @@ pub struct CastingPlane {
     pub slot: OccluderSlot,
     pub bias: f32,
     pub side: u32,
-    pub padding: [u32; 2],
+    pub softening: f32,
+    pub padding: u32,
 }
 
 impl CastingPlane {
-    /// The plane under a directional light, or `None` where it casts nothing.
-    pub fn directional(baked: &BakedPlane, slot: &Slot, to_light: Vec3) -> Option<Self> {
+    /// The plane under a directional light of an angular radius, or `None` where it casts nothing.
+    pub fn directional(baked: &BakedPlane, slot: &Slot, to_light: Vec3, radius_rad: f32) -> Option<Self> {
         let PlaneRows { a, b, s } = shade::plane_rows(&baked.plane, baked.side, to_light)?;
-        Self::checked(a, b, s, baked, slot)
+        Some(Self {
+            softening: shade::softening(baked, to_light, radius_rad),
+            ..Self::checked([a, b, s], baked, slot)?
+        })
     }
 
     /// The plane under a point light, or `None` where it has no area.
     pub fn point_light(baked: &BakedPlane, slot: &Slot) -> Option<Self> {
         let [equation, a, b] = plane_and_duals(&baked.plane);
-        if equation.truncate() == Vec3::ZERO { None } else { Self::checked(a, b, equation, baked, slot) }
+        if equation.truncate() == Vec3::ZERO { None } else { Self::checked([a, b, equation], baked, slot) }
     }
 
     /// Rows that are not finite (a plane of nearly no area) never reach the shader: it may not branch on NaN.
-    fn checked(a: Vec4, b: Vec4, s: Vec4, baked: &BakedPlane, slot: &Slot) -> Option<Self> {
+    fn checked([a, b, s]: [Vec4; 3], baked: &BakedPlane, slot: &Slot) -> Option<Self> {
         let side = match baked.side {
             Side::Both => 0,
             Side::Front => 1,
             Side::Back => 2,
         };
-        let plane = Self { a, b, s, slot: slot.into(), bias: baked.bias, side, padding: [0; 2] };
+        let plane = Self { a, b, s, slot: slot.into(), bias: baked.bias, side, softening: 0.0, padding: 0 };
         (a.is_finite() && b.is_finite() && s.is_finite() && baked.bias.is_finite()).then_some(plane)
     }
 }
@@ -194,7 +198,7 @@ pub fn struct_layouts() -> Vec<StructLayout> {
         layout!(Frame { clip_from_world, light, eye }),
         layout!(Instance { clip_from_unit, world_from_unit, light }),
         layout!(OccluderSlot { region, layer, channel, encoding }),
-        layout!(CastingPlane { a, b, s, slot, bias, side }),
+        layout!(CastingPlane { a, b, s, slot, bias, side, softening }),
         layout!(Rectangle { origin, u, v, plane, a, b, color, slot }),
         layout!(SilhouetteEdge { a, b }),
         layout!(Material { base_color, alpha_cutoff, repeat_u, repeat_v }),

@@ -2,7 +2,8 @@
 //!
 //! One forward pass. The affine rows of each plane (thesis eq. 2-8, see `solver::shade`) are computed on the CPU once
 //! per light and instance, and the lists of the sections chosen; a plane that casts nothing under that light is in none
-//! of them, so it costs no fragment anything.
+//! of them, so it costs no fragment anything. Under a directional light of some size edges are soft where textures are
+//! distance fields; for a light without size nothing is asked, so that hard edges pay nothing.
 
 use super::{
     FrameRequest, Light, Mode, RenderError,
@@ -16,8 +17,8 @@ use super::{
     technique::{Cost, Technique},
 };
 use shadowfit_solver::{
-    plane::{BakedSet, SDF_BORDER, SectionLists},
-    shade::EDGE_ON,
+    plane::{BakedSet, SDF_BORDER, SDF_PER_TEXEL, SectionLists},
+    shade::{EDGE_ON, MIN_SPREAD},
 };
 use std::collections::BTreeSet;
 use wgpu::util::{DeviceExt, TextureDataOrder};
@@ -26,6 +27,8 @@ use wgpu::util::{DeviceExt, TextureDataOrder};
 #[derive(Debug)]
 pub struct OccluderPlanes {
     set: BakedSet,
+    /// Angular radius of directional lights; 0: hard edges.
+    light_radius_rad: f32,
     /// One a plane.
     slots: Vec<Slot>,
     atlas_bytes: usize,
@@ -45,6 +48,14 @@ impl OccluderPlanes {
     /// # Errors
     /// Their textures exceed the adapter's limits, or the driver reports an error.
     pub fn new(stage: &Stage, set: &BakedSet) -> Result<Self, RenderError> {
+        Self::soft(stage, set, 0.0)
+    }
+
+    /// The same with soft edges: directional lights have this angular radius (the sun: 0.0047), 0 to pi/4.
+    ///
+    /// # Errors
+    /// As of [`OccluderPlanes::new`].
+    pub fn soft(stage: &Stage, set: &BakedSet, light_radius_rad: f32) -> Result<Self, RenderError> {
         let gpu = &stage.gpu;
         let limits = gpu.limits();
         let textures: Vec<_> = set.planes.iter().map(|baked| &baked.texture).collect();
@@ -64,17 +75,34 @@ impl OccluderPlanes {
         let array = texture(wgpu::TextureViewDimension::D2Array);
         let bindings = [(fragment, STORAGE), (fragment, array), (fragment, SAMPLER), (fragment, STORAGE)];
         let group_layout = layout(gpu, "planes", &bindings);
-        let options = ForwardOptions { constants: constants().to_vec(), ..Default::default() };
+        let options = ForwardOptions { constants: forward_constants(light_radius_rad), ..Default::default() };
         let forward = Forward::new(stage, &OCCLUDER_PLANES, Some(&group_layout), options);
         let group = group(gpu, &group_layout, &resources((&casting, &lists), &occluders, &sampler));
         gpu.check()?;
         let (set, slots, atlas_bytes) = (set.clone(), atlas.slots, atlas.rgba.len());
-        Ok(Self { set, slots, atlas_bytes, casting, lists, occluders, sampler, group, forward, view: None })
+        Ok(Self {
+            set,
+            light_radius_rad,
+            slots,
+            atlas_bytes,
+            casting,
+            lists,
+            occluders,
+            sampler,
+            group,
+            forward,
+            view: None,
+        })
     }
 
     /// The planes and where their textures lie.
     pub(crate) fn planes(&self) -> (&BakedSet, &[Slot]) {
         (&self.set, &self.slots)
+    }
+
+    /// The pipeline constants of planes.wgsl and occluder_planes.wgsl.
+    pub(crate) fn forward_constants(&self) -> Vec<(&'static str, f64)> {
+        forward_constants(self.light_radius_rad)
     }
 
     /// Bindings 0 to 3 of group 2.
@@ -113,7 +141,7 @@ impl OccluderPlanes {
     fn casting_plane(&self, index: usize, light_unit: &Light) -> Option<CastingPlane> {
         let (baked, slot) = (&self.set.planes[index], &self.slots[index]);
         match *light_unit {
-            Light::Directional { to_light } => CastingPlane::directional(baked, slot, to_light),
+            Light::Directional { to_light } => CastingPlane::directional(baked, slot, to_light, self.light_radius_rad),
             Light::Point { .. } => CastingPlane::point_light(baked, slot),
         }
     }
@@ -121,7 +149,10 @@ impl OccluderPlanes {
 
 impl Technique for OccluderPlanes {
     fn name(&self) -> String {
-        "occluder planes".to_string()
+        match self.light_radius_rad {
+            0.0 => "occluder planes".to_string(),
+            radius_rad => format!("occluder planes, light radius {:.2} deg", radius_rad.to_degrees()),
+        }
     }
 
     fn update(
@@ -169,8 +200,19 @@ impl Technique for OccluderPlanes {
 }
 
 /// The pipeline constants of planes.wgsl.
-pub(crate) fn constants() -> [(&'static str, f64); 2] {
-    [("EDGE_ON", f64::from(EDGE_ON)), ("SDF_BORDER", f64::from(SDF_BORDER))]
+pub(crate) fn constants() -> [(&'static str, f64); 4] {
+    [
+        ("EDGE_ON", f64::from(EDGE_ON)),
+        ("SDF_BORDER", f64::from(SDF_BORDER)),
+        ("SDF_PER_TEXEL", f64::from(SDF_PER_TEXEL)),
+        ("MIN_SPREAD", f64::from(MIN_SPREAD)),
+    ]
+}
+
+fn forward_constants(light_radius_rad: f32) -> Vec<(&'static str, f64)> {
+    let mut all = constants().to_vec();
+    all.push(("LIGHT_SINE", f64::from(light_radius_rad.sin())));
+    all
 }
 
 fn resources<'a>(

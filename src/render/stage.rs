@@ -72,6 +72,10 @@ pub(crate) enum Part {
     Casters,
     /// Those of the ground.
     Ground,
+    /// Those that no light passes.
+    Opaque,
+    /// Those that some light passes.
+    Transparent,
 }
 
 impl Part {
@@ -80,6 +84,8 @@ impl Part {
             Self::All => true,
             Self::Casters => !batch.ground,
             Self::Ground => batch.ground,
+            Self::Opaque => !batch.transparent,
+            Self::Transparent => batch.transparent,
         }
     }
 }
@@ -162,6 +168,12 @@ impl Stage {
             DrawCalls::OnePerInstance => self.placements.len(),
         };
         calls * self.model.batches.iter().filter(|batch| part.holds(batch)).count()
+    }
+
+    /// Does light pass some of the triangles?
+    #[must_use]
+    pub fn has_transparent(&self) -> bool {
+        self.model.batches.iter().any(|batch| batch.transparent)
     }
 
     /// Draws a frame with what `technique` prepares for its light. Alpha is 255 everywhere but on the background of

@@ -11,8 +11,8 @@
 //!   2002): faces behind count, with caps, to infinity; depth clamping keeps those beyond the far plane. Right with the eye
 //!   anywhere. [`Counting::ZFailClipped`] leaves depth clamping out, and is wrong where the far plane cuts a volume open.
 //!
-//! What casts is a soup, not a solid (see [`volume`](super::volume)): every triangle counts, and the outline of a closed
-//! body twice. z-pass draws light caps only of casters whose depth the surface may lack: single-sided ones, seen from
+//! What casts may be a soup (see [`volume`](super::volume)): every triangle counts, but closed bodies cast with one half,
+//! as in the papers above ([`Casters::halved`]). z-pass draws light caps only of casters whose depth the surface may lack: single-sided ones, seen from
 //! behind, and cut-outs, in their holes.
 //!
 //! Not guaranteed: cut-outs and blended materials, which cast as if opaque and whole; 256 volumes over one point, which
@@ -78,6 +78,7 @@ impl StencilVolumes {
             return Err(RenderError::Unsupported { technique: "stencil shadow volumes", feature: "depth clamping" });
         }
         let (casters, source) = Casters::of_scene(scene, frame, |_| 0);
+        let casters = casters.halved();
         let is_seen_whole = |&triangle: &u32| {
             let material = &scene.materials[scene.material_of[triangle as usize] as usize];
             scene.soup.sides[triangle as usize] == Sides::Both && material.alpha_cutoff.is_none()

@@ -21,9 +21,11 @@ use wgpu::util::{DeviceExt, TextureDataOrder};
 
 /// What a draw has in common: cull mode and textures. The order of the draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Look {
+pub struct Look {
     ground: bool,
-    double_sided: bool,
+    transparent: bool,
+    /// Both sides are drawn.
+    pub double_sided: bool,
     has_holes: bool,
     image: Option<usize>,
     repeat: [bool; 2],
@@ -37,6 +39,8 @@ const EXTREME_DIRECTIONS: usize = 512;
 pub struct Batch {
     /// Of the ground: receives and does not cast.
     pub ground: bool,
+    /// Light passes it ([`Material::transmittance`](crate::scene::Material)).
+    pub transparent: bool,
     /// Both sides are drawn.
     pub double_sided: bool,
     /// Its image cuts holes.
@@ -94,14 +98,15 @@ impl Model {
                 }
             };
             let bind_group = bind(gpu, material, &materials, view, look.repeat);
-            let Look { ground, double_sided, has_holes, .. } = look;
-            batches.push(Batch { ground, double_sided, has_holes, bind_group, vertices: range });
+            let Look { ground, transparent, double_sided, has_holes, .. } = look;
+            batches.push(Batch { ground, transparent, double_sided, has_holes, bind_group, vertices: range });
         }
         Ok(Self { vertices, batches, extremes, bounds })
     }
 }
 
-fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Range<u32>)>) {
+/// The vertices in the order of [`Model::vertices`], three a triangle, in the unit space of `frame`, and what they draw.
+pub fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Range<u32>)>) {
     let mut triangles_of: BTreeMap<Look, Vec<usize>> = BTreeMap::new();
     for (triangle, &material) in scene.material_of.iter().enumerate() {
         let material = &scene.materials[material as usize];
@@ -112,6 +117,7 @@ fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Range<u32>
         triangles_of
             .entry(Look {
                 ground,
+                transparent: material.transmittance.is_some(),
                 double_sided,
                 has_holes: material.alpha_cutoff.is_some(),
                 image: material.image,

@@ -31,13 +31,24 @@ pub struct Casters {
     edges: Vec<Edge>,
     /// Those of an edge stand together, sorted by class.
     uses: Vec<Use>,
+    /// Which of `bodies` a triangle is of.
+    body_of: Vec<u32>,
+    bodies: Vec<Body>,
 }
 
-/// Two points that some triangle connects, `start < end`.
+/// Triangles that hang together by edges.
+#[derive(Clone, Copy, Debug)]
+struct Body {
+    /// 1 or -1 if only triangles cast whose front or back faces the light; 0: all.
+    side: i32,
+    low: Vec3,
+    high: Vec3,
+}
+
+/// Two points that some triangle connects.
 #[derive(Clone, Copy, Debug)]
 struct Edge {
-    start: u32,
-    end: u32,
+    points: [u32; 2],
     first_use: usize,
 }
 
@@ -107,13 +118,59 @@ impl Casters {
         let mut uses: Vec<_> = (0u32..).zip(&points).zip(class_of).flat_map(uses_of).collect();
         uses.sort_unstable_by_key(|&(ends, u)| (ends, u.class, u.triangle, u.along));
         let mut edges: Vec<Edge> = Vec::new();
-        for (i, &([start, end], _)) in uses.iter().enumerate() {
-            if edges.last().is_none_or(|edge| [edge.start, edge.end] != [start, end]) {
-                edges.push(Edge { start, end, first_use: i });
+        for (first_use, &(points, _)) in uses.iter().enumerate() {
+            if edges.last().is_none_or(|edge| edge.points != points) {
+                edges.push(Edge { points, first_use });
             }
         }
         let uses = uses.into_iter().map(|(_, u)| u).collect();
-        Self { corners: corners.to_vec(), class_of: class_of.to_vec(), edges, uses }
+        let (body_of, bodies) = (vec![0; corners.len()], vec![Body { side: 0, low: Vec3::ZERO, high: Vec3::ZERO }]);
+        Self { corners: corners.to_vec(), class_of: class_of.to_vec(), edges, uses, body_of, bodies }
+    }
+
+    /// Lets closed bodies cast with one half of their triangles: those whose front faces the light, which is where a way to
+    /// the light leaves the body; of bodies turned inside out, the others. Outlines then count once and not twice, and half
+    /// of the caps are left. A body is what hangs together by edges; it is closed where each of its edges is run through
+    /// as often one way as the other, and it is halved under lights outside of its bounding box. No point comes out of the
+    /// shadow by this but those that an inside-out part of a body encloses. For opaque casters: it is no longer the number
+    /// of surfaces that is counted.
+    #[must_use]
+    pub fn halved(mut self) -> Self {
+        let mut forest = Forest { parent: (0..self.corners.len() as u32).collect() };
+        for uses in self.uses_by_edge() {
+            uses.windows(2).for_each(|pair| forest.join(pair[0].triangle, pair[1].triangle));
+        }
+        self.body_of = (0..self.corners.len() as u32).map(|triangle| forest.root(triangle)).collect();
+        // Bodies are numbered by their roots: most numbers are of none.
+        let mut volume = vec![0.0; self.corners.len()];
+        let none = Body { side: 0, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
+        self.bodies = vec![none; self.corners.len()];
+        for (corners, &body) in self.corners.iter().zip(&self.body_of) {
+            let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+            volume[body as usize] += a.dot(b.cross(c));
+            let Body { low, high, .. } = &mut self.bodies[body as usize];
+            (*low, *high) = corners.iter().fold((*low, *high), |(low, high), p| (low.min(*p), high.max(*p)));
+        }
+        self.bodies.iter_mut().zip(volume).for_each(|(body, volume)| body.side = sign(volume));
+        let open = self.uses_by_edge().filter(|uses| uses.iter().map(|u| u.along).sum::<i32>() != 0);
+        let open: Vec<u32> = open.map(|uses| self.body_of[uses[0].triangle as usize]).collect();
+        open.into_iter().for_each(|body| self.bodies[body as usize].side = 0);
+        self
+    }
+
+    /// The triangles at each edge.
+    fn uses_by_edge(&self) -> impl Iterator<Item = &[Use]> {
+        let ends = self.edges.iter().skip(1).map(|next| next.first_use).chain([self.uses.len()]);
+        self.edges.iter().zip(ends).map(|(edge, end)| &self.uses[edge.first_use..end])
+    }
+
+    /// The side of a triangle that faces the light, 1 or -1; 0 where it casts nothing.
+    fn facing(&self, triangle: usize, light: Vec4) -> i32 {
+        let facing = facing(&self.corners[triangle], light);
+        let Body { side, low, high } = self.bodies[self.body_of[triangle] as usize];
+        let p = light.truncate();
+        let is_in_box = light.w != 0.0 && p.cmpge(low).all() && p.cmple(high).all();
+        if side == 0 || side == facing || is_in_box { facing } else { 0 }
     }
 
     /// Number of triangles.
@@ -143,7 +200,7 @@ impl Casters {
     /// The volume under a light, as the module says. Triangles edge-on to the light cast nothing.
     #[must_use]
     pub fn volume(&self, light: Vec4) -> Volume {
-        let facings: Vec<i32> = self.corners.iter().map(|corners| facing(corners, light)).collect();
+        let facings: Vec<i32> = (0..self.corners.len()).map(|triangle| self.facing(triangle, light)).collect();
         let mut volume = Volume::default();
         for (triangle, &facing) in (0u32..).zip(&facings) {
             match facing {
@@ -152,9 +209,8 @@ impl Casters {
                 _ => {}
             }
         }
-        for (i, edge) in self.edges.iter().enumerate() {
-            let end = self.edges.get(i + 1).map_or(self.uses.len(), |next| next.first_use);
-            for uses in self.uses[edge.first_use..end].chunk_by(|a, b| a.class == b.class) {
+        for uses in self.uses_by_edge() {
+            for uses in uses.chunk_by(|a, b| a.class == b.class) {
                 let count: i32 = uses.iter().map(|u| u.along * facings[u.triangle as usize]).sum();
                 let Use { triangle, k, along, .. } = uses[0];
                 let [from, to] = [k, (k + 1) % 3].map(|k| 3 * triangle + k);
@@ -167,7 +223,7 @@ impl Casters {
         volume
     }
 
-    /// Number of triangles between a point and the light: of volumes that contain it. A ray exactly through an edge or
+    /// Number of casting triangles between a point and the light: of volumes that contain it. A ray exactly through an edge or
     /// a corner counts as one beside it, the same one for all triangles there.
     #[must_use]
     pub fn blockers(&self, p: Vec3, light: Vec4) -> u32 {
@@ -187,7 +243,8 @@ impl Casters {
             let first = side(a, b);
             side(b, c) == first && side(c, a) == first && t > 0.0 && t < reach
         };
-        self.corners.iter().filter(|corners| blocks(corners)).count() as u32
+        let casts = |triangle: &usize| self.facing(*triangle, light) != 0 && blocks(&self.corners[*triangle]);
+        (0..self.corners.len()).filter(casts).count() as u32
     }
 }
 
@@ -207,5 +264,32 @@ fn facing(corners: &[Vec3; 3], light: Vec4) -> i32 {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3());
     let light = light.as_dvec4();
     let height = (b - a).cross(c - a).dot(light.truncate() - light.w * a);
-    i32::from(height > 0.0) - i32::from(height < 0.0)
+    sign(height)
+}
+
+fn sign(x: f64) -> i32 {
+    i32::from(x > 0.0) - i32::from(x < 0.0)
+}
+
+/// Triangles that hang together, as trees whose roots stand for them.
+struct Forest {
+    parent: Vec<u32>,
+}
+
+impl Forest {
+    fn root(&mut self, triangle: u32) -> u32 {
+        let mut root = triangle;
+        while self.parent[root as usize] != root {
+            // Half the way is cut for the next.
+            let above = self.parent[self.parent[root as usize] as usize];
+            self.parent[root as usize] = above;
+            root = above;
+        }
+        root
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let [a, b] = [a, b].map(|triangle| self.root(triangle));
+        self.parent[a.max(b) as usize] = a.min(b);
+    }
 }

@@ -2,13 +2,13 @@
 //! where theory says so once a step is left out.
 
 use crate::stages::{
-    Case, SIZE_PX, WORLD, box_on_ground, cuboid, directional, empty, keep, mask, plate_over_ground, quad,
+    Case, SIZE_PX, WORLD, box_on_ground, cuboid, directional, empty, gpu, keep, mask, plate_over_ground, quad,
 };
 use glam::{Quat, Vec3};
 use shadowfit::{
     masks::MaskErrors,
     render::{
-        Camera, FrameRequest, Light,
+        Antialias, Camera, FrameOptions, FrameRequest, Light, Mode,
         ray_traced::RayTraced,
         stage::{Placement, Stage},
         stencil_volumes::{Counting, StencilVolumes},
@@ -144,7 +144,7 @@ fn instances_shadow_each_other() {
             crate::stages::push(&mut together, corners.map(|p| world_from_unit.transform_point3(p.as_vec3())));
         }
     }
-    let mut stage = Stage::new(crate::stages::gpu(), &model, &WORLD, &placements).expect("it fits");
+    let mut stage = Stage::new(gpu(), &model, &WORLD, &placements).expect("it fits");
     let traced = RayTraced::new(together, &WORLD).expect("a model");
     for light in lights() {
         for counting in RIGHT {
@@ -161,5 +161,33 @@ fn instances_shadow_each_other() {
             let wrong = errors.share(errors.wrong());
             assert!(wrong < 2.0 * AT_BORDERS, "{counting:?} {light:?}: {wrong}");
         }
+    }
+}
+
+#[test]
+fn models_are_wrong_in_single_pixels_only() {
+    for name in ["teapot", "aircraft"] {
+        let path = format!("{}/models/{name}.glb", env!("CARGO_MANIFEST_DIR"));
+        let scene = shadowfit::scene::load(std::path::Path::new(&path)).expect("our own model");
+        let frame = shadowfit_solver::mesh::Mesh::new(&scene.soup).expect("a model").frame;
+        let mut stage = Stage::new(gpu(), &scene, &frame, &[Placement::IDENTITY]).expect("it fits");
+        let traced = RayTraced::new(scene.clone(), &frame).expect("a model");
+        let mut blocked = 0;
+        for (i, light) in lights().into_iter().enumerate() {
+            let options = FrameOptions { size_px: [512, 512], mode: Mode::Mask, antialias: Antialias::Off };
+            let camera = Camera::turntable(1.3 * i as f32, 0.9 - 0.4 * i as f32);
+            let request = FrameRequest { camera, light, options };
+            let expected = traced.picture(&traced.look(&request).expect("traced")).expect("traced");
+            blocked += expected.pixels().filter(|pixel| pixel.0[1] == 255 && pixel.0[0] == 0).count();
+            for counting in RIGHT {
+                let mut technique = StencilVolumes::new(&stage, &scene, &frame, counting).expect("it fits");
+                let drawn = stage.render(&mut technique, &request).expect("drawn");
+                keep(&shadowfit::masks::difference(&expected, &drawn), &format!("volumes of {name} {i}.png"));
+                let errors = MaskErrors::between(&expected, &drawn);
+                let [missed, falsely] = [errors.missed, errors.false_].map(|pixels| errors.share(pixels));
+                assert!(missed + falsely < AT_BORDERS, "{name}, {counting:?}, {light:?}: {missed} + {falsely}");
+            }
+        }
+        assert!(blocked > 3_000, "{name}: {blocked} pixels in shadow");
     }
 }
