@@ -45,11 +45,11 @@ const GLASS: [f32; 3] = [0.75, 0.5, 0.25];
 pub enum World {
     /// The model on itself.
     Model,
-    /// The model on itself, with the sections of a set of planes, by its number.
+    /// The model on itself, with the sections of a set of planes that serves no ground, by its number.
     Planes(usize),
     /// The model on a ground; what counts is the ground.
     Ground,
-    /// The same with the sections of a set of planes, by its number.
+    /// The same with the sections of a set of planes that serves the ground, too, by its number.
     PlanesOnGround(usize),
     /// The model with its blended materials, or all of glass where it has none, on a ground; what counts is the ground.
     Glass,
@@ -108,10 +108,12 @@ impl Bench {
         scenes.insert(World::Ground, standing(&scene, &frame, None));
         scenes.insert(World::Glass, standing(&glass(&scene), &frame, None));
         for (number, Planes { scene, set, .. }) in planes.iter().enumerate() {
-            scenes.insert(World::Planes(number), scene.clone());
-            if let Some((_, section)) = set.ground_section() {
-                scenes.insert(World::PlanesOnGround(number), standing(scene, &frame, Some(section)));
-            }
+            match set.ground_section() {
+                Some((_, section)) => {
+                    scenes.insert(World::PlanesOnGround(number), standing(scene, &frame, Some(section)))
+                }
+                None => scenes.insert(World::Planes(number), scene.clone()),
+            };
         }
         let stage = |(&world, scene): (&World, &Scene)| -> Result<(World, Stage), FitError> {
             Ok((world, Stage::new(&gpu, scene, &frame, &[Placement::IDENTITY])?))

@@ -7,12 +7,12 @@
 use super::{
     CompareOptions,
     bench::{Bench, World},
-    scaling,
+    scaling::{self, Scaled},
 };
 use crate::{
     masks::MaskErrors,
     pipeline::FitError,
-    render::{Antialias, FrameOptions, FrameRequest, Light, Mode, field::field, ray_traced::RayTraced, stage::Stage},
+    render::{Antialias, FrameOptions, FrameRequest, Light, Mode, field::field, ray_traced::RayTraced},
 };
 use glam::{DVec3, Vec3};
 use serde::Serialize;
@@ -72,10 +72,9 @@ pub(super) fn measure(
             options: FrameOptions { size_px: [bench.size_px; 2], mode: Mode::Mask, antialias: Antialias::Off },
         };
         let reference = traced.picture(&traced.look(&request)?)?;
-        for (stage, technique, drawn) in &mut techniques {
-            let stage: &mut Stage = &mut stages[*stage];
-            let errors = MaskErrors::between(&reference, &stage.render(&mut **drawn, &request)?);
-            rows.push(row((technique, name, instances), errors));
+        for Scaled { stage, name: technique, technique: drawn } in &mut techniques {
+            let drawn = stages[*stage].render(&mut **drawn, &request)?;
+            rows.push(row((technique, name, instances), MaskErrors::between(&reference, &drawn)));
         }
     }
     Ok(rows)

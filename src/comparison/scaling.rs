@@ -6,7 +6,7 @@
 
 use super::{
     CompareOptions,
-    bench::{Bench, World},
+    bench::{Bench, Planes, World},
     catalogue::{Family, Subject},
 };
 use crate::{
@@ -98,24 +98,33 @@ fn arrange((bound, instances): (Bound, usize)) -> (Vec<Placement>, Camera) {
     }
 }
 
+/// A technique of the scaling tests, and the number of its stage.
+pub(super) struct Scaled {
+    pub stage: usize,
+    pub name: String,
+    pub technique: Box<dyn Technique>,
+}
+
 /// The techniques that scale: those of the model's world, one setting each, and every set of planes.
 pub(super) fn techniques(
     bench: &Bench,
     stages: &[Stage],
     options: &CompareOptions,
-) -> Result<Vec<(usize, String, Box<dyn Technique>)>, FitError> {
+) -> Result<Vec<Scaled>, RenderError> {
     let traced = bench.traced(World::Model);
     let subject = Subject { stage: &stages[0], scene: traced.scene(), mesh: traced.mesh(), frame: &bench.frame };
-    let mut out: Vec<(usize, String, Box<dyn Technique>)> = Vec::new();
+    let mut out = Vec::new();
     for &family in &options.families {
         if family == Family::Planes {
-            for (set, planes) in bench.planes.iter().enumerate() {
+            let scaled = |(set, _): &(usize, &Planes)| bench.stage(World::Planes(*set)).is_some();
+            for (set, planes) in bench.planes.iter().enumerate().filter(scaled) {
                 let technique: Box<dyn Technique> = Box::new(OccluderPlanes::new(&stages[1 + set], &planes.set)?);
-                out.push((1 + set, format!("{}, {}", technique.name(), planes.label), technique));
+                let name = format!("{}, {}", technique.name(), planes.label);
+                out.push(Scaled { stage: 1 + set, name, technique });
             }
         }
         if let Some(technique) = subject.representative(family)? {
-            out.push((0, technique.name(), technique));
+            out.push(Scaled { stage: 0, name: technique.name(), technique });
         }
     }
     Ok(out)
@@ -143,7 +152,7 @@ fn test(
     let mut samples = vec![(Vec::new(), Vec::new()); techniques.len()];
     for frame in 0..super::speed::WARM_UP + options.frames {
         progress(format!("{instances} instances, {bound:?}: frame {} of {}", frame + 1, options.frames));
-        for ((stage, _, technique), (frames, cpu)) in techniques.iter_mut().zip(&mut samples) {
+        for (Scaled { stage, technique, .. }, (frames, cpu)) in techniques.iter_mut().zip(&mut samples) {
             let request = FrameRequest {
                 camera,
                 light: Light::Directional { to_light: bench.light(frame) },
@@ -158,8 +167,8 @@ fn test(
     }
     let medians: Vec<[f64; 2]> = samples.into_iter().map(|(frames, cpu)| [median(frames), median(cpu)]).collect();
     let floor = medians.first().map_or(f64::MIN_POSITIVE, |none| none[0].max(f64::MIN_POSITIVE));
-    let row = |((_, technique, _), [frame, cpu]): (_, [f64; 2])| ScalingRow {
-        technique,
+    let row = |(Scaled { name, .. }, [frame, cpu]): (Scaled, [f64; 2])| ScalingRow {
+        technique: name,
         bound,
         instances,
         frame: frame / floor,
