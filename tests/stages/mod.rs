@@ -41,14 +41,6 @@ impl Case {
         Self::in_world(scene, WORLD)
     }
 
-    /// A committed model; world space is its unit space.
-    pub fn of_model(model: &str) -> Self {
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("models").join(model);
-        let scene = shadowfit::scene::load(&path).expect("a model");
-        let world = Mesh::new(&scene.soup).expect("triangles").frame;
-        Self::in_world(scene, world)
-    }
-
     /// A committed model on a ground of half extent 2; world space is the model's unit space.
     pub fn on_ground(model: &str) -> Self {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("models").join(model);
