@@ -21,7 +21,7 @@ pub(super) fn svg(comparison: &Comparison) -> Option<String> {
     let mut plots = Vec::new();
     for (i, family) in families.into_iter().enumerate() {
         let rows = || {
-            let shown = |world: World, against| world != World::Ground && against == Against::Hard;
+            let shown = |world: World, against| !world.counts_ground() && against == Against::Hard;
             comparison
                 .rows
                 .iter()

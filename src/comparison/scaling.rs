@@ -4,11 +4,15 @@
 //! moves before every frame. Three tests tell what binds: vertices (instances a hundredth as large, next to no
 //! fragments), fragments (ten times as large, seen from straight above), and the CPU (a draw call for each instance).
 
-use super::{CompareOptions, bench::Bench, catalogue};
+use super::{
+    CompareOptions,
+    bench::{Bench, World},
+    catalogue::{Family, Subject},
+};
 use crate::{
     pipeline::FitError,
     render::{
-        Antialias, Camera, FrameOptions, FrameRequest, Light, Mode,
+        Antialias, Camera, FrameOptions, FrameRequest, Light, Mode, RenderError,
         field::field,
         occluder_planes::OccluderPlanes,
         stage::{DrawCalls, Placement, Stage},
@@ -20,7 +24,7 @@ use glam::Vec3;
 use serde::Serialize;
 
 /// Seed of the instances.
-const FIELD_SEED: u64 = 1;
+pub(super) const FIELD_SEED: u64 = 1;
 
 /// Most instances where fragments bind: each of them covers the whole frame.
 const FILL_INSTANCES: usize = 10;
@@ -95,24 +99,33 @@ fn arrange((bound, instances): (Bound, usize)) -> (Vec<Placement>, Camera) {
 }
 
 /// The techniques that scale: those of the model's world, one setting each, and every set of planes.
-fn techniques(
+pub(super) fn techniques(
     bench: &Bench,
     stages: &[Stage],
     options: &CompareOptions,
 ) -> Result<Vec<(usize, String, Box<dyn Technique>)>, FitError> {
+    let traced = bench.traced(World::Model);
+    let subject = Subject { stage: &stages[0], scene: traced.scene(), mesh: traced.mesh(), frame: &bench.frame };
     let mut out: Vec<(usize, String, Box<dyn Technique>)> = Vec::new();
     for &family in &options.families {
-        if family == catalogue::Family::Planes {
+        if family == Family::Planes {
             for (set, planes) in bench.planes.iter().enumerate() {
                 let technique: Box<dyn Technique> = Box::new(OccluderPlanes::new(&stages[1 + set], &planes.set)?);
                 out.push((1 + set, format!("{}, {}", technique.name(), planes.label), technique));
             }
         }
-        if let Some(technique) = catalogue::representative(family, (&stages[0], &bench.model))? {
+        if let Some(technique) = subject.representative(family)? {
             out.push((0, technique.name(), technique));
         }
     }
     Ok(out)
+}
+
+/// The model and the model with the sections of each set of planes, as instances.
+pub(super) fn stages(bench: &Bench, placements: &[Placement]) -> Result<Vec<Stage>, RenderError> {
+    let scenes =
+        std::iter::once(bench.traced(World::Model).scene()).chain(bench.planes.iter().map(|planes| &planes.scene));
+    scenes.map(|scene| Stage::new(&bench.gpu, scene, &bench.frame, placements)).collect()
 }
 
 fn test(
@@ -122,12 +135,10 @@ fn test(
     progress: &mut dyn FnMut(String),
 ) -> Result<(Vec<ScalingRow>, f64), FitError> {
     let (placements, camera) = arrange((bound, instances));
-    let scenes = std::iter::once(bench.model.scene()).chain(bench.planes.iter().map(|planes| &planes.scene));
-    let stage = |scene| Stage::new(&bench.gpu, scene, &bench.frame, &placements);
-    let mut stages = scenes.map(stage).collect::<Result<Vec<_>, _>>()?;
+    let mut stages = stages(bench, &placements)?;
     let draw_calls = if bound == Bound::DrawCalls { DrawCalls::OnePerInstance } else { DrawCalls::Instanced };
     stages.iter_mut().for_each(|stage| stage.draw_calls = draw_calls);
-    let timer = Timer::new(&stages[0]);
+    let timer = Timer::new(&bench.gpu);
     let mut techniques = techniques(bench, &stages, options)?;
     let mut samples = vec![(Vec::new(), Vec::new()); techniques.len()];
     for frame in 0..super::speed::WARM_UP + options.frames {

@@ -62,6 +62,11 @@ impl Case {
         [traced, self.stage.render(technique, request).expect("drawn")]
     }
 
+    /// A box on a ground that receives and does not cast.
+    pub fn of_box_on_its_ground() -> Self {
+        Self::new(Scene { ground_triangles: 2, ..box_on_ground() })
+    }
+
     /// For each pixel: does the camera see the ground?
     pub fn ground_seen(&self, request: &FrameRequest) -> Vec<bool> {
         self.traced.ground_seen(&self.traced.look(request).expect("traced"))
