@@ -34,7 +34,7 @@ use shadowfit_solver::mesh::Frame;
 use wgpu::{BlendComponent, BlendFactor, BlendOperation, BlendState};
 
 /// The least that counts as passing: a sixteenth of what a byte can show. Smaller ones make sums so large that their rounding
-/// shows where they cancel: with 1e-30, a face leaves 4e-6 of light's logarithm behind, with this 7e-7.
+/// shows where they cancel: of 1e-30 the logarithm is rounded by up to 4e-6 at each face, of this by 5e-7.
 const LEAST_TRANSMITTANCE: f32 = 1.0 / 4096.0;
 
 const NAME: &str = "transparent volumes";
