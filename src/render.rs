@@ -10,6 +10,7 @@
 mod atlas;
 mod bindings;
 mod camera;
+mod casting;
 pub mod cpu;
 mod depth_pass;
 pub mod field;

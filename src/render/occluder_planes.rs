@@ -5,22 +5,28 @@
 //! of them, so it costs no fragment anything.
 
 use super::{
-    FrameRequest, Light, Mode, RenderError,
+    FrameRequest, Mode, RenderError,
     atlas::{Atlas, Slot},
-    bindings::{SAMPLER, STORAGE, buffer, group, layout, texture},
+    bindings::{Binding, INTEGERS, SAMPLER, group, layout, texture},
+    casting::Casting,
     forward::{Forward, ForwardOptions},
-    gpu::{Gpu, OCCLUDER_PLANES},
-    layout::CastingPlane,
+    gpu::{CONSTANT_VISIBILITY, Gpu, OCCLUDER_PLANES},
     plane_view::PlaneView,
     stage::{Begin, Part, Stage, Targets},
     technique::{Cost, Technique},
 };
 use shadowfit_solver::{
-    plane::{BakedSet, SDF_BORDER, SectionLists},
+    plane::{BakedSet, SDF_BORDER},
     shade::EDGE_ON,
 };
-use std::collections::BTreeSet;
 use wgpu::util::{DeviceExt, TextureDataOrder};
+
+/// Bindings 0 to 2 of group 2, those of planes.wgsl.
+pub(crate) const BINDINGS: [Binding; 3] = [
+    (wgpu::ShaderStages::VERTEX_FRAGMENT, INTEGERS),
+    (wgpu::ShaderStages::FRAGMENT, texture(wgpu::TextureViewDimension::D2Array)),
+    (wgpu::ShaderStages::FRAGMENT, SAMPLER),
+];
 
 /// Draws the model with the shadows of a baked set.
 #[derive(Debug)]
@@ -29,11 +35,13 @@ pub struct OccluderPlanes {
     /// One a plane.
     slots: Vec<Slot>,
     atlas_bytes: usize,
-    casting: wgpu::Buffer,
-    lists: wgpu::Buffer,
+    casting: Casting,
+    constants: Vec<(&'static str, f64)>,
     occluders: wgpu::TextureView,
     sampler: wgpu::Sampler,
     group: wgpu::BindGroup,
+    /// Draws the sections that read no plane under this light.
+    bare: Forward,
     forward: Forward,
     /// What mode `planes` draws over the model; made when first needed.
     view: Option<PlaneView>,
@@ -56,20 +64,18 @@ impl OccluderPlanes {
             min_filter: wgpu::FilterMode::Linear,
             ..Default::default()
         });
-        let (count, storage) = (stage.placements().len(), wgpu::BufferUsages::STORAGE);
-        let casting = buffer::<CastingPlane>(gpu, "casting", count * most_planes(set), storage);
-        let per_instance = 2 * (set.sections.len() + 1) + longest(set);
-        let lists = buffer::<u32>(gpu, "lists", 1 + count * per_instance, storage);
-        let fragment = wgpu::ShaderStages::FRAGMENT;
-        let array = texture(wgpu::TextureViewDimension::D2Array);
-        let bindings = [(fragment, STORAGE), (fragment, array), (fragment, SAMPLER), (fragment, STORAGE)];
-        let group_layout = layout(gpu, "planes", &bindings);
-        let options = ForwardOptions { constants: constants().to_vec(), ..Default::default() };
+        let casting = Casting::new(gpu, set, &atlas.slots, stage.placements().len())?;
+        let constants = [("EDGE_ON", f64::from(EDGE_ON)), ("SDF_BORDER", f64::from(SDF_BORDER))];
+        let constants: Vec<_> = constants.into_iter().chain(casting.constants()).collect();
+        let group_layout = layout(gpu, "planes", &BINDINGS);
+        let options = ForwardOptions { constants: vec![("VISIBILITY", 1.0)], ..Default::default() };
+        let bare = Forward::new(stage, &CONSTANT_VISIBILITY, None, options);
+        let options = ForwardOptions { constants: constants.clone(), ..Default::default() };
         let forward = Forward::new(stage, &OCCLUDER_PLANES, Some(&group_layout), options);
-        let group = group(gpu, &group_layout, &resources((&casting, &lists), &occluders, &sampler));
+        let group = group(gpu, &group_layout, &resources(&casting, &occluders, &sampler));
         gpu.check()?;
         let (set, slots, atlas_bytes) = (set.clone(), atlas.slots, atlas.rgba.len());
-        Ok(Self { set, slots, atlas_bytes, casting, lists, occluders, sampler, group, forward, view: None })
+        Ok(Self { set, slots, atlas_bytes, casting, constants, occluders, sampler, group, bare, forward, view: None })
     }
 
     /// The planes and where their textures lie.
@@ -77,45 +83,14 @@ impl OccluderPlanes {
         (&self.set, &self.slots)
     }
 
-    /// Bindings 0 to 3 of group 2.
-    pub(crate) fn resources(&self) -> [wgpu::BindingResource<'_>; 4] {
-        resources((&self.casting, &self.lists), &self.occluders, &self.sampler)
+    /// The pipeline constants of planes.wgsl.
+    pub(crate) fn constants(&self) -> &[(&'static str, f64)] {
+        &self.constants
     }
 
-    /// The planes that cast in each instance under its light and are read by some section, and `lists` of planes.wgsl.
-    fn casting_under(&self, stage: &Stage, light: &Light) -> (Vec<CastingPlane>, Vec<u32>) {
-        let (sections, instances) = (self.set.sections.len(), stage.placements().len());
-        let (mut casting, mut ranges, mut lists) = (Vec::new(), vec![sections as u32], Vec::new());
-        let start = 1 + 2 * instances * (sections + 1);
-        // Several sections may read a plane: its rows are made once.
-        let mut number_of: Vec<Option<Option<u32>>> = Vec::new();
-        for placement in stage.placements() {
-            let light = placement.light_unit(light);
-            let chosen = self.set.lists(light.from_centre());
-            number_of.clear();
-            number_of.resize(self.set.planes.len(), None);
-            for section in 0..=sections {
-                ranges.push((start + lists.len()) as u32);
-                for &plane in chosen.get(section).map_or(&[][..], Vec::as_slice) {
-                    let number = number_of[plane as usize].get_or_insert_with(|| {
-                        casting.push(self.casting_plane(plane as usize, &light)?);
-                        Some(casting.len() as u32 - 1)
-                    });
-                    lists.extend(*number);
-                }
-                ranges.push((start + lists.len()) as u32);
-            }
-        }
-        ranges.extend(lists);
-        (casting, ranges)
-    }
-
-    fn casting_plane(&self, index: usize, light_unit: &Light) -> Option<CastingPlane> {
-        let (baked, slot) = (&self.set.planes[index], &self.slots[index]);
-        match *light_unit {
-            Light::Directional { to_light } => CastingPlane::directional(baked, slot, to_light),
-            Light::Point { .. } => CastingPlane::point_light(baked, slot),
-        }
+    /// Bindings 0 to 2 of group 2.
+    pub(crate) fn resources(&self) -> [wgpu::BindingResource<'_>; 3] {
+        resources(&self.casting, &self.occluders, &self.sampler)
     }
 }
 
@@ -130,9 +105,7 @@ impl Technique for OccluderPlanes {
         request: &FrameRequest,
         _: &mut wgpu::CommandEncoder,
     ) -> Result<(), RenderError> {
-        let (casting, lists) = self.casting_under(stage, &request.light);
-        stage.gpu.queue.write_buffer(&self.casting, 0, bytemuck::cast_slice(&casting));
-        stage.gpu.queue.write_buffer(&self.lists, 0, bytemuck::cast_slice(&lists));
+        self.casting.update(&stage.gpu, &self.set, stage.placements(), &request.light);
         Ok(())
     }
 
@@ -150,51 +123,34 @@ impl Technique for OccluderPlanes {
             return Ok(());
         }
         let mut pass = targets.begin(encoder, (request.options.mode, Begin::Clear));
+        let casting = &self.casting;
+        self.bare.draw_sections(stage, request, targets, (&mut pass, Part::All, &|label| !casting.is_read(label)));
         pass.set_bind_group(2, &self.group, &[]);
-        self.forward.draw(stage, request, targets, (&mut pass, Part::All));
+        self.forward.draw_sections(stage, request, targets, (&mut pass, Part::All, &|label| casting.is_read(label)));
         Ok(())
     }
 
     fn cost(&self, stage: &Stage) -> Cost {
         Cost {
             passes: 1,
-            draw_calls: stage.calls_per_pass(),
+            draw_calls: stage.calls_over(&|label| self.casting.is_read(label))
+                + stage.calls_over(&|label| !self.casting.is_read(label)),
             update_passes: 0,
             update_draw_calls: 0,
-            texture_bytes: self.atlas_bytes,
-            buffer_bytes: (self.casting.size() + self.lists.size()) as usize,
+            texture_bytes: self.atlas_bytes + self.casting.bytes(),
+            buffer_bytes: 0,
             on_light_change: "three rows a casting plane and the sections' lists, per instance, on the CPU".to_string(),
         }
     }
 }
 
-/// The pipeline constants of planes.wgsl.
-pub(crate) fn constants() -> [(&'static str, f64); 2] {
-    [("EDGE_ON", f64::from(EDGE_ON)), ("SDF_BORDER", f64::from(SDF_BORDER))]
-}
-
 fn resources<'a>(
-    (casting, lists): (&'a wgpu::Buffer, &'a wgpu::Buffer),
+    casting: &'a Casting,
     occluders: &'a wgpu::TextureView,
     sampler: &'a wgpu::Sampler,
-) -> [wgpu::BindingResource<'a>; 4] {
-    let (occluders, sampler) = (wgpu::BindingResource::TextureView(occluders), wgpu::BindingResource::Sampler(sampler));
-    [casting.as_entire_binding(), occluders, sampler, lists.as_entire_binding()]
-}
-
-/// All lists that a light may choose.
-fn choices(set: &BakedSet) -> impl Iterator<Item = &SectionLists> {
-    set.active.iter().flat_map(|active| &active.lists).chain([&set.sections])
-}
-
-/// Indices in all lists of a set, under the light where there are most.
-fn longest(set: &BakedSet) -> usize {
-    choices(set).map(|lists| lists.iter().map(Vec::len).sum()).max().unwrap_or(0)
-}
-
-/// Planes that are in some list, under the light where there are most.
-fn most_planes(set: &BakedSet) -> usize {
-    choices(set).map(|lists| lists.iter().flatten().collect::<BTreeSet<_>>().len()).max().unwrap_or(0)
+) -> [wgpu::BindingResource<'a>; 3] {
+    let [casting, occluders] = [&casting.view, occluders].map(wgpu::BindingResource::TextureView);
+    [casting, occluders, wgpu::BindingResource::Sampler(sampler)]
 }
 
 fn upload_atlas(gpu: &Gpu, atlas: &Atlas) -> wgpu::TextureView {
