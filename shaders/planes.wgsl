@@ -13,6 +13,15 @@ override SECTIONS: u32;
 override INSTANCE_TEXELS: u32;
 override ROW_TEXELS: u32;
 
+// What a distance field rises by from texel to texel; plane::SDF_PER_TEXEL.
+override SDF_PER_TEXEL: f32;
+
+// Least spread of a soft edge; shade::MIN_SPREAD.
+override MIN_SPREAD: f32;
+
+// Texels of a plane.
+const PLANE_TEXELS: u32 = 4;
+
 // Where an occluder texture lies in the atlas.
 struct OccluderSlot {
     // x, y, width, height in texels.
@@ -34,6 +43,8 @@ struct CastingPlane {
     bias: f32,
     // 0: receivers on both sides, 1: in front, 2: behind. Only point lights ask.
     side: u32,
+    // How fast edges soften with the distance from the plane; only lights of some size ask.
+    softening: f32,
 }
 
 // Texture coordinates of a crossing; `casts` is false where the ray misses the rectangle.
@@ -42,8 +53,8 @@ struct Crossing {
     casts: bool,
 }
 
-// What each instance reads under this light, INSTANCE_TEXELS each: a texel a section, where its planes start and how
-// many there are; then the planes, four texels each, section by section.
+// What each instance reads under this light, INSTANCE_TEXELS each: a texel a section, where its planes start and
+// end; then the planes, PLANE_TEXELS each, section by section.
 @group(2) @binding(0) var casting: texture_2d<u32>;
 @group(2) @binding(1) var occluders: texture_2d_array<f32>;
 @group(2) @binding(2) var occluder_sampler: sampler;
@@ -55,7 +66,7 @@ fn casting_texel(i: u32) -> vec4u {
 
 fn slot_of(texel: vec4u) -> OccluderSlot {
     let region = vec4f(vec4u(texel.x & 0xffffu, texel.x >> 16u, texel.y & 0xffffu, texel.y >> 16u));
-    return OccluderSlot(region, texel.z >> 5u, (texel.z >> 3u) & 3u, (texel.z >> 2u) & 1u);
+    return OccluderSlot(region, (texel.z & 0xffffu) >> 5u, (texel.z >> 3u) & 3u, (texel.z >> 2u) & 1u);
 }
 
 fn casting_plane(i: u32) -> CastingPlane {
@@ -67,7 +78,13 @@ fn casting_plane(i: u32) -> CastingPlane {
         slot_of(slot),
         bitcast<f32>(slot.w),
         slot.z & 3u,
+        // As many of its bits as fit: the upper half.
+        bitcast<f32>(slot.z & 0xffff0000u),
     );
+}
+
+fn on_rectangle(ab: vec2f) -> bool {
+    return all(ab >= vec2f(0.0)) && all(ab <= vec2f(1.0));
 }
 
 // Where the ray from p towards a directional light crosses the plane beyond its bias.
@@ -75,7 +92,7 @@ fn crossing(plane: CastingPlane, p: vec3f) -> Crossing {
     let p1 = vec4f(p, 1.0);
     let ab = vec2f(dot(plane.a, p1), dot(plane.b, p1));
     let s = dot(plane.s, p1);
-    return Crossing(ab, s > plane.bias && all(ab >= vec2f(0.0)) && all(ab <= vec2f(1.0)));
+    return Crossing(ab, s > plane.bias && on_rectangle(ab));
 }
 
 // The same for a point light at c: between p and c, beyond the bias, not edge-on; signs first, then the division.
@@ -92,17 +109,46 @@ fn crossing_point_light(plane: CastingPlane, c: vec3f, p: vec3f) -> Crossing {
     let s = height / n_dot_d;
     let q1 = vec4f(p + s * to_light, 1.0);
     let ab = vec2f(dot(plane.a, q1), dot(plane.b, q1));
-    return Crossing(ab, s * distance > plane.bias && all(ab >= vec2f(0.0)) && all(ab <= vec2f(1.0)));
+    return Crossing(ab, s * distance > plane.bias && on_rectangle(ab));
 }
 
-// How much of the light is blocked, 0..1, at ab in 0..1: the bilinear value, taps clamped to the region; of a distance
-// field, whether that reaches its border.
-fn sample(slot: OccluderSlot, ab: vec2f) -> f32 {
+// The bilinear value at ab in 0..1, taps clamped to the region.
+fn value(slot: OccluderSlot, ab: vec2f) -> f32 {
     let size = slot.region.zw;
     let texel = slot.region.xy + clamp(ab * size, vec2f(0.5), size - 0.5);
     let uv = texel / vec2f(textureDimensions(occluders));
-    let value = textureSampleLevel(occluders, occluder_sampler, uv, slot.layer, 0.0)[slot.channel];
+    return textureSampleLevel(occluders, occluder_sampler, uv, slot.layer, 0.0)[slot.channel];
+}
+
+// How much of the light is blocked, 0..1: the value; of a distance field, whether that reaches its border.
+fn sample(slot: OccluderSlot, ab: vec2f) -> f32 {
+    let value = value(slot, ab);
     return select(value, f32(value >= SDF_BORDER), slot.encoding == 1u);
+}
+
+// The same with soft edges, `spread` to each side in units of a field's value, at any ab: beyond the centres of the
+// outermost texels, and beyond the rectangle, a field goes on falling. The outermost texels are open: nothing is left
+// of them where the field has fallen by the spread.
+fn sample_soft(slot: OccluderSlot, ab: vec2f, spread: f32) -> f32 {
+    if slot.encoding == 0u {
+        return select(0.0, value(slot, ab), on_rectangle(ab));
+    }
+    let at = ab * slot.region.zw;
+    let beyond = distance(at, clamp(at, vec2f(0.5), slot.region.zw - 0.5)) * SDF_PER_TEXEL;
+    if !(beyond < spread) {
+        return 0.0;
+    }
+    return smoothstep(SDF_BORDER - spread, SDF_BORDER + spread, value(slot, ab) - beyond);
+}
+
+// Spread of the edges at distance s from the plane.
+fn spread(softening: f32, s: f32) -> f32 {
+    return clamp(softening * s, MIN_SPREAD, SDF_BORDER);
+}
+
+// Share of a light that stands above the horizon of the surface itself; `sine` is that of the light's angular radius.
+fn horizon(n_dot_l: f32, sine: f32) -> f32 {
+    return smoothstep(-sine, sine, n_dot_l);
 }
 
 // The planes that a section of an instance reads: where they start and end in `casting`.
@@ -116,7 +162,7 @@ fn list_of(instance: u32, section: u32) -> vec2u {
 // blocks.
 fn visibility(list: vec2u, p: vec3f) -> f32 {
     var v = 1.0;
-    for (var i = list.x; i < list.y && v > 0.0; i += 4u) {
+    for (var i = list.x; i < list.y && v > 0.0; i += PLANE_TEXELS) {
         let plane = casting_plane(i);
         let hit = crossing(plane, p);
         if hit.casts {
@@ -126,10 +172,25 @@ fn visibility(list: vec2u, p: vec3f) -> f32 {
     return v;
 }
 
-// The same under a point light at c.
+// The same with soft edges.
+fn visibility_soft(list: vec2u, p: vec3f) -> f32 {
+    var v = 1.0;
+    for (var i = list.x; i < list.y && v > 0.0; i += PLANE_TEXELS) {
+        let plane = casting_plane(i);
+        let p1 = vec4f(p, 1.0);
+        let s = dot(plane.s, p1);
+        if s > plane.bias {
+            let ab = vec2f(dot(plane.a, p1), dot(plane.b, p1));
+            v *= 1.0 - sample_soft(plane.slot, ab, spread(plane.softening, s));
+        }
+    }
+    return v;
+}
+
+// The same as `visibility` under a point light at c.
 fn visibility_point_light(list: vec2u, c: vec3f, p: vec3f) -> f32 {
     var v = 1.0;
-    for (var i = list.x; i < list.y && v > 0.0; i += 4u) {
+    for (var i = list.x; i < list.y && v > 0.0; i += PLANE_TEXELS) {
         let plane = casting_plane(i);
         let hit = crossing_point_light(plane, c, p);
         if hit.casts {

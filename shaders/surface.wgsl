@@ -38,6 +38,8 @@ struct Surface {
     @location(4) @interpolate(flat) material: u32,
     @location(5) @interpolate(flat) section: u32,
     @location(6) @interpolate(flat) instance: u32,
+    // What the technique's own vertex stage puts here.
+    @location(7) @interpolate(perspective, centroid) at_vertex: f32,
 }
 
 // Invariant: passes that compare with the depth of an earlier one meet the same.
@@ -51,6 +53,7 @@ fn surface_of(vertex: Vertex, instance: u32) -> Surface {
         vertex.material,
         vertex.section,
         instance,
+        0.0,
     );
 }
 

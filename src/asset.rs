@@ -25,7 +25,7 @@ pub mod splice;
 mod write;
 
 pub use atlas::Channel;
-pub use extension::{ActiveEntry, Extension, PlaneEntry, PlaneSet, TextureRef};
+pub use extension::{ActiveEntry, Extension, GroundEntry, PlaneEntry, PlaneSet, TextureRef};
 pub use read::{MAX_FILE_PLANES, ModelRectangle, read, read_plane_file};
 pub use write::{AssetRequest, Written, WrittenAtlas, check_input, check_outputs, write};
 
@@ -36,7 +36,7 @@ use glam::DVec3;
 use serde::Serialize;
 use shadowfit_solver::{
     mesh::Frame,
-    plane::{ActiveLists, BakedPlane, BakedSet, OccluderTexture, SectionLists, ShadowPlane, Side},
+    plane::{ActiveLists, BakedPlane, BakedSet, Ground, OccluderTexture, SectionLists, ShadowPlane, Side},
 };
 use std::path::{Path, PathBuf};
 
@@ -54,6 +54,12 @@ pub struct Bounds {
 }
 
 impl Bounds {
+    /// The middle.
+    #[must_use]
+    pub fn centre(&self) -> DVec3 {
+        0.5 * (self.min + self.max)
+    }
+
     /// Finite, and no side negative.
     fn is_box(&self) -> bool {
         self.min.is_finite() && self.max.is_finite() && self.min.cmple(self.max).all()
@@ -119,6 +125,40 @@ pub struct ModelPlane {
     pub bias: f64,
 }
 
+/// A level square that receives the model's shadow and casts none, its middle below that of the model's box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ModelGround {
+    /// Where it lies along +Y, metres.
+    pub height: f64,
+    /// Half of its side, metres.
+    pub half_extent: f64,
+}
+
+impl ModelGround {
+    /// The ground in model space.
+    #[must_use]
+    pub fn from_unit_space(ground: &Ground, frame: &Frame) -> Self {
+        let height = frame.centre_model.y + f64::from(ground.height) * frame.radius;
+        Self { height, half_extent: f64::from(ground.half_extent) * frame.radius }
+    }
+
+    /// The ground in unit space.
+    #[must_use]
+    pub fn in_unit_space(&self, frame: &Frame) -> Ground {
+        let height = (self.height - frame.centre_model.y) / frame.radius;
+        Ground { height: height as f32, half_extent: (self.half_extent / frame.radius) as f32 }
+    }
+
+    /// What makes it no ground: the member of the file, and why.
+    fn fault(&self) -> Option<(&'static str, &'static str)> {
+        if !self.height.is_finite() {
+            return Some(("height", "not a finite number"));
+        }
+        let has_area = self.half_extent.is_finite() && self.half_extent > 0.0;
+        (!has_area).then_some(("halfExtent", "not a finite number above 0"))
+    }
+}
+
 /// The planes of one model, read back and checked, in model space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShadowSet {
@@ -130,6 +170,8 @@ pub struct ShadowSet {
     pub sections: SectionLists,
     /// Shorter lists per light direction, where there are such; directions in model space.
     pub active: Option<ActiveLists>,
+    /// The ground that the last section is for, where there is one.
+    pub ground: Option<ModelGround>,
 }
 
 impl ShadowSet {
@@ -147,6 +189,7 @@ impl ShadowSet {
             planes: self.planes.iter().map(baked).collect(),
             sections: self.sections.clone(),
             active: self.active.clone(),
+            ground: self.ground.map(|ground| ground.in_unit_space(frame)),
         }
     }
 }
@@ -222,6 +265,12 @@ pub enum AssetError {
         /// What is wrong.
         why: String,
     },
+    /// A ground that no file can hold.
+    #[error("ground: {why}")]
+    Ground {
+        /// What is wrong.
+        why: String,
+    },
     /// The receivers' box is empty or not finite.
     #[error("the receivers' box is not one: {bounds:?}")]
     Bounds {
@@ -246,7 +295,11 @@ impl AssetError {
         match self {
             Self::Io { .. } | Self::OverwritesInput { .. } | Self::Occupied { .. } => 2,
             Self::Malformed { .. } | Self::Invalid { .. } | Self::AlreadyFitted { .. } | Self::Stem { .. } => 3,
-            Self::Plane { .. } | Self::Sections { .. } | Self::Bounds { .. } | Self::Encode(_) => 4,
+            Self::Plane { .. }
+            | Self::Sections { .. }
+            | Self::Ground { .. }
+            | Self::Bounds { .. }
+            | Self::Encode(_) => 4,
         }
     }
 }

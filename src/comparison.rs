@@ -68,7 +68,9 @@ fn write(request: &FitRequest, comparison: &Comparison, pictures: &[errors::Pict
     batch.stage(&path("techniques.csv"), comparison.csv().as_bytes())?;
     batch.stage(&path("scaling.csv"), comparison.scaling_csv().as_bytes())?;
     batch.stage(&path("techniques.md"), comparison.markdown().as_bytes())?;
-    batch.stage(&path("techniques.svg"), chart::svg(comparison).as_bytes())?;
+    if let Some(svg) = chart::svg(comparison) {
+        batch.stage(&path("techniques.svg"), svg.as_bytes())?;
+    }
     for picture in pictures {
         batch.stage(&path(&format!("{}.png", picture.name)), &png(&picture.picture)?)?;
     }

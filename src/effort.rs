@@ -34,10 +34,36 @@ pub struct Plan {
     pub lists: ListOptions,
     /// What the textures may cost.
     pub budget: BudgetOptions,
+    /// What a ground gets, where there is one.
+    pub ground: GroundPlan,
+}
+
+/// Numbers of a ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroundPlan {
+    /// Pairs, about.
+    pub pairs: usize,
+    /// How planes of its own are searched; without, those of the model serve it too.
+    pub search: Option<SearchOptions>,
 }
 
 /// Bytes of all textures where the user names none.
 const TEXTURE_BUDGET: usize = 2 << 20;
+
+/// How planes of a section are searched by default.
+const SECTION_SEARCH: SearchOptions = SearchOptions {
+    max_planes: 16,
+    proposals: 200,
+    screening: SampleSize { lights: 512, pairs: 6_000 },
+    screening_texels: 32,
+    finalists: 8,
+    refined: 2,
+    scoring: SampleSize { lights: 2048, pairs: 24_000 },
+    texels: 48,
+    refine_steps: 4,
+    replace_rounds: 0,
+    seed: 0,
+};
 
 impl Effort {
     /// A first look.
@@ -60,6 +86,7 @@ impl Effort {
                     ..whole.search
                 },
                 lists: ListOptions { grid: 160, rounds: 2, ..whole.lists },
+                ground: GroundPlan { pairs: 400_000, ..whole.ground },
                 ..whole
             },
             divided: Plan {
@@ -71,6 +98,7 @@ impl Effort {
                     scoring: SampleSize { lights: 512, pairs: 16_000 },
                     ..divided.search
                 },
+                ground: GroundPlan { pairs: 1_000_000, ..divided.ground },
                 ..divided
             },
         }
@@ -107,27 +135,26 @@ impl Effort {
                 byte_gain: 2e-8,
                 smoothing: 1,
             },
+            ground: GroundPlan { pairs: 1_000_000, search: None },
         };
         let divided = Plan {
             sections: 96,
             trace: TraceOptions { pairs: 8_000_000, lights: 2048, stride: 8, exposure_rays: 16, seed: 0 },
             directions: 192,
-            search: SearchOptions {
-                max_planes: 16,
-                proposals: 200,
-                screening: SampleSize { lights: 512, pairs: 6_000 },
-                screening_texels: 32,
-                finalists: 8,
-                refined: 2,
-                scoring: SampleSize { lights: 2048, pairs: 24_000 },
-                texels: 48,
-                refine_steps: 4,
-                replace_rounds: 0,
-                seed: 0,
-            },
+            search: SECTION_SEARCH,
             min_gain: 3e-6,
             lists: ListOptions { max_lookups: 4, grid: 200, rounds: 2, smoothing: 1 },
             budget: BudgetOptions { byte_gain: 5e-11, smoothing: 1, ..whole.budget },
+            ground: GroundPlan {
+                pairs: 2_000_000,
+                search: Some(SearchOptions {
+                    max_planes: 24,
+                    finalists: 16,
+                    scoring: SampleSize { lights: 1024, pairs: 100_000 },
+                    texels: 64,
+                    ..SECTION_SEARCH
+                }),
+            },
         };
         Self { whole, divided }
     }
@@ -149,6 +176,7 @@ impl Effort {
                     replace_rounds: 2,
                     ..whole.search
                 },
+                ground: GroundPlan { pairs: 3_000_000, ..whole.ground },
                 ..whole
             },
             divided: Plan {
@@ -165,6 +193,7 @@ impl Effort {
                 min_gain: 1e-6,
                 lists: ListOptions { grid: 255, rounds: 3, ..divided.lists },
                 budget: BudgetOptions { byte_gain: 2e-11, ..divided.budget },
+                ground: GroundPlan { pairs: 8_000_000, ..divided.ground },
                 ..divided
             },
         }

@@ -5,7 +5,7 @@ use crate::{
     effort::Effort,
     fitting::{Fitted, fit},
     render::RenderError,
-    report::{CurvePoint, Lookups, Report, SCHEMA, Times},
+    report::{CurvePoint, GroundReport, Lookups, Report, SCHEMA, Times},
     scene::{self, Scene, SceneError, Skipped},
     validation::{ImageErrors, ValidationOptions, validate},
 };
@@ -15,7 +15,7 @@ use shadowfit_solver::{
     lights::LightDomain,
     mesh::{Mesh, MeshError},
     metrics::{Metrics, measure},
-    plane::BakedSet,
+    plane::{BakedSet, Ground},
     receivers::{ReceiverOptions, Receivers, sample},
     sampling::hash,
     visibility::{Pairs, trace},
@@ -63,7 +63,9 @@ pub struct FitRequest {
     pub texture_budget: Option<usize>,
     /// How to prove a bound; none without. A model is left whole for it.
     pub certificate: Option<ColumnOptions>,
-    /// The fewest planes that reach this held-out error.
+    /// Is the shadow on the ground below the model served, too?
+    pub ground: bool,
+    /// The fewest planes that reach this held-out error, also on the ground, where there is one.
     pub max_error: Option<f64>,
     /// Texels along the longer side, where the user names a number.
     pub texture_size: Option<usize>,
@@ -178,10 +180,11 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
         seed: request.seed,
         light_domain: request.domain_text.clone(),
         planes: fitted.set.planes.len(),
-        sections: fitted.set.sections.len(),
+        sections: fitted.set.model_sections(),
         lookups: proof.lookups,
         texture_bytes: written.texture_bytes,
         held_out: proof.held_out,
+        ground: proof.ground,
         training: fitted.training,
         image: proof.image,
         certificate: fitted.certificate,
@@ -207,6 +210,7 @@ fn check_files(request: &FitRequest) -> Result<(), AssetError> {
 /// What the written files are worth.
 struct Proof {
     held_out: Metrics,
+    ground: Option<GroundReport>,
     lookups: Lookups,
     curve: Vec<CurvePoint>,
     image: Option<ImageErrors>,
@@ -221,8 +225,12 @@ fn prove(request: &FitRequest, mesh: &Mesh, fitted: &Fitted, written: &Path, sea
     let section_of = receiver_sections(mesh, &receivers, &scene.section_of);
     let held_out = measure(&set, &pairs, &section_of);
     let curve = curve(fitted, (&set, &held_out), (mesh, &pairs, &receivers), search_s);
-    let mut proof =
-        Proof { held_out, lookups: Lookups::measure(&set, &pairs, &section_of), curve, image: None, picture: None };
+    let lookups = Lookups::measure(&set, &pairs, &section_of);
+    let ground = set.ground_section().map(|(ground, section)| {
+        let pairs = held_out_ground((mesh, &ground), request, HELD_OUT, Purpose::HeldOut);
+        GroundReport::measure(&set, &pairs, section)
+    });
+    let mut proof = Proof { held_out, ground, lookups, curve, image: None, picture: None };
     if let Some(options) = &request.validation {
         let lights = validation_lights(request, &held_out, options.lights);
         let validation = validate((&scene, mesh), &set, &lights, options)?;
@@ -254,6 +262,19 @@ pub(crate) fn held_out(
     (trace(mesh, &receivers, &lights, request.domain.solid_angle()), receivers)
 }
 
+/// The same of the ground.
+pub(crate) fn held_out_ground(
+    (mesh, ground): (&Mesh, &Ground),
+    request: &FitRequest,
+    [receivers, lights]: [usize; 2],
+    purpose: Purpose,
+) -> Pairs {
+    let sampling = ReceiverOptions { count: receivers, exposure_rays: EXPOSURE_RAYS, seed: seed_for(request, purpose) };
+    let receivers = ground.sample(mesh, &sampling);
+    let lights = request.domain.directions(lights, seed_for(request, purpose));
+    trace(mesh, &receivers, &lights, request.domain.solid_angle())
+}
+
 /// The worst held-out light first, then others that neither search nor metrics used.
 fn validation_lights(request: &FitRequest, held_out: &Metrics, count: usize) -> Vec<Vec3> {
     let others = request.domain.directions(count, seed_for(request, Purpose::Image));
@@ -271,7 +292,8 @@ fn curve(
 ) -> Vec<CurvePoint> {
     let (mesh, pairs, receivers) = held_out;
     let section_of = receiver_sections(mesh, receivers, &fitted.section_of);
-    let mut nothing = BakedSet { sections: fitted.set.sections.clone(), ..BakedSet::default() };
+    let mut nothing =
+        BakedSet { sections: fitted.set.sections.clone(), ground: fitted.set.ground, ..BakedSet::default() };
     nothing.sections.iter_mut().for_each(Vec::clear);
     let mut curve = vec![CurvePoint::new(&nothing, &measure(&nothing, pairs, &section_of), 0.0)];
     let point = |(set, seconds): &(BakedSet, f64)| CurvePoint::new(set, &measure(set, pairs, &section_of), *seconds);

@@ -17,20 +17,35 @@ pub mod field;
 mod forward;
 pub mod gpu;
 mod layout;
+mod light_map;
 mod light_view;
 pub mod occluder_planes;
+pub mod perspective_shadow_map;
+pub mod planar;
 mod plane_view;
+pub mod projective_texture;
 pub mod ray_traced;
+pub mod receiver;
 pub mod shadow_map;
+mod silhouette;
+pub mod silhouette_map;
+mod silhouette_points;
+pub mod soft_planar;
 pub mod stage;
+pub mod stencil_volumes;
 pub mod technique;
 pub mod timing;
+pub mod transparent;
 pub mod turntable;
 pub mod unshadowed;
 mod upload;
+pub mod vertex_visibility;
+mod view_matrices;
+pub mod volume;
+mod volume_pass;
 
 pub use camera::Camera;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 /// Share of the base colour that a surface shows without direct light.
 pub const AMBIENT: f32 = 0.25;
@@ -94,6 +109,15 @@ impl Light {
         match *self {
             Self::Directional { to_light } => to_light,
             Self::Point { position } => position - p_unit,
+        }
+    }
+
+    /// As a homogeneous point: (direction towards the light, 0), or (position, 1).
+    #[must_use]
+    pub fn homogeneous(&self) -> Vec4 {
+        match *self {
+            Self::Directional { to_light } => to_light.extend(0.0),
+            Self::Point { position } => position.extend(1.0),
         }
     }
 
@@ -164,8 +188,8 @@ pub enum RenderError {
         /// Pixels.
         limit: u32,
     },
-    /// A technique needs what the adapter does not have.
-    #[error("{technique} needs {feature}, which the adapter does not have")]
+    /// A technique needs what the adapter, the light or the planes do not give.
+    #[error("{technique} needs {feature}, and that is not given")]
     Unsupported {
         /// Who.
         technique: &'static str,
@@ -191,7 +215,7 @@ fn srgb_from_linear(x: f32) -> u8 {
 }
 
 /// Linear value 0..1 of an sRGB byte.
-fn linear_from_srgb(byte: u8) -> f32 {
+pub(crate) fn linear_from_srgb(byte: u8) -> f32 {
     let x = f32::from(byte) / 255.0;
     if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use shadowfit_solver::{
     certificate::Certificate,
-    metrics::Metrics,
+    metrics::{Metrics, measure},
     plane::BakedSet,
     shade::set_rows,
     visibility::{LightPairs, Pairs},
@@ -32,7 +32,7 @@ pub struct Report {
     pub light_domain: String,
     /// Shadow planes in the asset.
     pub planes: usize,
-    /// Sections in the asset.
+    /// Sections of the model.
     pub sections: usize,
     /// Textures read per fragment, before early out.
     pub lookups: Lookups,
@@ -40,7 +40,9 @@ pub struct Report {
     pub texture_bytes: u64,
     /// Errors on receivers and lights that the search never saw, of the files as written.
     pub held_out: Metrics,
-    /// Errors on the pairs that decided the textures.
+    /// The same of the ground's shadow, and the planes of its section; `null` without `--ground`.
+    pub ground: Option<GroundReport>,
+    /// Errors on the model's pairs that decided the textures.
     pub training: Metrics,
     /// Errors of rendered frames; `null` with `--validate none`.
     pub image: Option<ImageErrors>,
@@ -61,6 +63,15 @@ pub struct Report {
     pub command: String,
     /// Files written, beside this one.
     pub files: Vec<String>,
+}
+
+impl Report {
+    /// The larger of the held-out errors of the model and of the ground.
+    #[must_use]
+    pub fn worst_error(&self) -> f64 {
+        self.ground
+            .map_or(self.held_out.shadow_error, |ground| ground.held_out.shadow_error.max(self.held_out.shadow_error))
+    }
 }
 
 /// Textures read per fragment before early out: the planes that can cast in the list of its section.
@@ -90,6 +101,31 @@ impl Lookups {
         let lights: Vec<_> = pairs.lights.par_iter().map(of_light).collect();
         let (sum, weight, max) = lights.iter().fold((0.0, 0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1, a.2.max(b.2)));
         Self { mean: if weight > 0.0 { sum / weight } else { 0.0 }, max }
+    }
+}
+
+/// How good the shadow on the ground is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GroundReport {
+    /// Errors on receivers and lights that the search never saw, of the files as written.
+    #[serde(flatten)]
+    pub held_out: Metrics,
+    /// Planes of its section.
+    pub planes: usize,
+    /// Textures read per fragment of it.
+    pub lookups: Lookups,
+}
+
+impl GroundReport {
+    /// Measures the ground's section on pairs of the ground.
+    #[must_use]
+    pub fn measure(set: &BakedSet, pairs: &Pairs, section: u32) -> Self {
+        let section_of = vec![section; pairs.receivers];
+        Self {
+            held_out: measure(set, pairs, &section_of),
+            planes: set.sections[section as usize].len(),
+            lookups: Lookups::measure(set, pairs, &section_of),
+        }
     }
 }
 
@@ -161,6 +197,11 @@ impl fmt::Display for Report {
             line("shadow_error", format!("{error:.4} held out = {missed:.4} missed + {false_:.4} false"))?;
             let [x, y, z] = held.worst_light.direction;
             line("worst light", format!("{:.4} from ({x:.3}, {y:.3}, {z:.3})", held.worst_light.max))?;
+        }
+        if let Some(GroundReport { held_out, planes, lookups }) = &self.ground {
+            let (error, missed, false_) = (held_out.shadow_error, held_out.missed, held_out.false_);
+            let read = format!("{planes} planes, {:.2} read, {} max", lookups.mean, lookups.max);
+            line("ground", format!("{error:.4} held out = {missed:.4} missed + {false_:.4} false ({read})"))?;
         }
         if let Some(c) = &self.certificate {
             let (found, bound, gap) = (c.found, c.lower_bound, c.gap);

@@ -57,6 +57,10 @@ pub struct Material {
     pub repeat: [bool; 2],
     /// Fragments with alpha below this (0..1) are discarded (alphaMode MASK).
     pub alpha_cutoff: Option<f32>,
+    /// Linear RGB share of the light that passes (alphaMode BLEND); `None` where the material is opaque. Of alpha `a` and
+    /// base colour `c`, the share `1 - a` passes, tinted by `c` as far as the surface is there: `(1 - a)(1 - a (1 - c))`,
+    /// the mean over all texels of the image. Shadow planes and most techniques take such materials for opaque.
+    pub transmittance: Option<[f32; 3]>,
 }
 
 /// Something in the file that the fit does not use.

@@ -6,6 +6,8 @@
 mod broken;
 #[path = "asset/fixtures.rs"]
 mod fixtures;
+#[path = "asset/ground.rs"]
+mod ground;
 #[path = "asset/packing.rs"]
 mod packing;
 #[path = "asset/survival.rs"]
@@ -68,7 +70,7 @@ fn a_model_without_shadow_gets_an_empty_set() {
     for path in [&written.model, &written.sidecar] {
         assert_eq!(
             read(path).unwrap(),
-            ShadowSet { bounds: BOUNDS, planes: vec![], sections: vec![vec![]], active: None }
+            ShadowSet { bounds: BOUNDS, planes: vec![], sections: vec![vec![]], active: None, ground: None }
         );
     }
     let (json, bin) = fixtures::open(&written.model);

@@ -10,8 +10,12 @@ mod answers;
 #[allow(dead_code, reason = "shared with tests/scene.rs, which uses more of it")]
 #[path = "scene/build.rs"]
 mod build;
+#[path = "cli/compare.rs"]
+mod compare;
 #[path = "cli/determinism.rs"]
 mod determinism;
+#[path = "cli/ground.rs"]
+mod ground;
 #[path = "cli/inputs.rs"]
 mod inputs;
 #[path = "cli/kills.rs"]

@@ -157,7 +157,12 @@ fn sectioned(scene: &mut Scene) -> BakedSet {
     let sections: Vec<Vec<u32>> = (0..7).map(|section| list(section, 1)).collect();
     let directions = vec![Vec3::Y, Vec3::X, Vec3::NEG_X, Vec3::Z];
     let of = |direction: u32| (0..7).map(|section| list(section, 2 + direction)).collect();
-    BakedSet { planes, sections, active: Some(ActiveLists { directions, lists: (0..4).map(of).collect() }) }
+    BakedSet {
+        planes,
+        sections,
+        active: Some(ActiveLists { directions, lists: (0..4).map(of).collect() }),
+        ground: None,
+    }
 }
 
 /// Each section has its shadows, and those of the list that the light picks. A distance field has no grey, so the twins
@@ -187,6 +192,32 @@ fn sections_agree_under_all_lights() {
     assert!(changed > 10_000, "the lists change too little to test anything: {changed}");
 }
 
+/// Under lights of some size values between light and shadow are many: their mean counts. Point lights stay hard.
+#[test]
+fn soft_edges_agree_under_all_lights() {
+    let mut scene = procedural::scene();
+    let set = sectioned(&mut scene);
+    let mesh = mesh_of(&scene);
+    let mut twins = Twins::with(&scene, &mesh, &set);
+    let hard: Vec<RgbaImage> = lights(&set.planes)
+        .into_iter()
+        .map(|light| twins.gpu.render(&request(views()[1], light, Mode::Mask)).expect("drawn"))
+        .collect();
+    let light_radius_rad = 0.05;
+    twins.gpu.set_soft_planes(&set, light_radius_rad).expect("the planes fit");
+    twins.cpu.set_soft_planes(&set, light_radius_rad);
+    for (light, hard) in lights(&set.planes).into_iter().zip(hard) {
+        let frames = twins.render(&request(views()[1], light, Mode::Mask));
+        let difference = compare(&frames);
+        assert!(difference.shadow <= 0.003 && difference.mean <= 0.5, "{light:?}: {difference:?}");
+        let changed = frames[0].pixels().zip(hard.pixels()).filter(|(p, q)| p != q).count();
+        match light {
+            Light::Directional { .. } => assert!(changed > 300, "{light:?}: {changed}"),
+            Light::Point { .. } => assert_eq!(changed, 0),
+        }
+    }
+}
+
 /// Shadow where the section has the plane, none where it has another or the triangle has no section.
 #[test]
 fn a_triangle_reads_the_list_of_its_section() {
@@ -195,7 +226,7 @@ fn a_triangle_reads_the_list_of_its_section() {
     let directions = vec![Vec3::Y, Vec3::NEG_Y, Vec3::X];
     let active = ActiveLists { directions, lists: vec![lists(0, 1), lists(1, 0), lists(1, 1)] };
     let sections = vec![vec![0, 1], vec![1, 0], vec![]];
-    let set = BakedSet { planes, sections, active: Some(active) };
+    let set = BakedSet { planes, sections, active: Some(active), ground: None };
     let high = Light::Point { position: Vec3::new(0.1, 0.9, 0.0) };
     for (section, light, is_lit) in [
         (0, directional(0.1, 1.0, 0.0), false),
@@ -230,7 +261,7 @@ fn thousands_of_planes_and_sections_are_drawn() {
     let some = procedural::planes();
     let planes: Vec<BakedPlane> = (0..planes).map(|i| some[i % some.len()].clone()).collect();
     let sections = (0..sections).map(|section| (4 * section..4 * section + 4).collect()).collect();
-    let mut twins = Twins::with(&scene, &mesh, &BakedSet { planes, sections, active: None });
+    let mut twins = Twins::with(&scene, &mesh, &BakedSet { planes, sections, active: None, ground: None });
     let difference = compare(&twins.render(&request(views()[0], directional(0.4, 0.8, 0.5), Mode::Mask)));
     assert!(difference.shadow <= 0.003 && difference.covered > 5_000, "{difference:?}");
 }

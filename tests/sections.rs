@@ -65,7 +65,12 @@ pub fn set(sections: u32) -> BakedSet {
         whole.iter().map(part).collect()
     };
     let active = ActiveLists { directions: (0..7).map(unit).collect(), lists: (0..7).map(some).collect() };
-    BakedSet { planes: (0..count).map(|i| plane(u64::from(i))).collect(), sections: whole, active: Some(active) }
+    BakedSet {
+        planes: (0..count).map(|i| plane(u64::from(i))).collect(),
+        sections: whole,
+        active: Some(active),
+        ground: None,
+    }
 }
 
 /// Where files for the Khronos validator go: `tests/khronos/validate.mjs` is run on them by the test script.

@@ -11,13 +11,9 @@
 //! Not guaranteed: the best field (the descent ends in a local optimum).
 
 use crate::{
-    plane::{Encoding, OccluderTexture, SDF_BORDER},
+    plane::{Encoding, OccluderTexture, SDF_BORDER, SDF_TEXELS},
     smoothing::{fill_unvoted, smoothed},
 };
-
-/// How many texels the byte range spans on either side of a border: fewer, and bilinear interpolation cannot place it;
-/// more, and bytes are too coarse.
-const RANGE_TEXELS: f32 = 2.0;
 
 /// Passes over the texels; after the second little changes.
 const PASSES: usize = 2;
@@ -100,7 +96,7 @@ impl<'a> VotedShape<'a> {
     #[must_use]
     pub fn field(&self, (width, height): (usize, usize)) -> OccluderTexture {
         let scale = Scale::new(&self.grid, (width, height));
-        let range = RANGE_TEXELS * 0.5 * (1.0 / scale.x + 1.0 / scale.y);
+        let range = SDF_TEXELS * 0.5 * (1.0 / scale.x + 1.0 / scale.y);
         let mut texels = vec![0u8; width * height];
         for y in 0..height {
             for x in 0..width {

@@ -75,6 +75,15 @@ impl LightDomain {
         }
     }
 
+    /// Is there a direction above the horizon (+Y)?
+    #[must_use]
+    pub fn is_seen_from_ground(self) -> bool {
+        match self {
+            Self::Sphere | Self::Hemisphere => true,
+            Self::Cone { axis, half_angle_rad } => angles(axis).1 + half_angle_rad > 0.0,
+        }
+    }
+
     /// Solid angle in steradians.
     #[must_use]
     pub fn solid_angle(self) -> f64 {

@@ -276,6 +276,36 @@ impl Mesh {
         )
     }
 
+    /// The share of the light, per colour, that reaches `origin` (see [`ray_origin`]) from `distance` along `direction`
+    /// (unit): the product of `transmittance`, 0 to 1, over all surfaces in between, in any order. Infinitely far for a
+    /// directional light. A ray exactly through an edge that two triangles share meets both.
+    #[must_use]
+    pub fn transmitted(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        distance: f32,
+        transmittance: impl Fn(u32) -> Vec3,
+    ) -> Vec3 {
+        let watertight = WatertightRay::new(origin, direction);
+        let mut product = Vec3::ONE;
+        any_hit(
+            &self.bvh,
+            &bvh_ray(origin, direction),
+            #[inline(always)]
+            |i| {
+                if let Some((t, barycentric)) = watertight.intersect(&self.corners[i as usize])
+                    && t < distance
+                    && self.is_solid(i, barycentric)
+                {
+                    product *= transmittance(i);
+                }
+                product == Vec3::ZERO
+            },
+        );
+        product
+    }
+
     /// The nearest surface from `origin` in direction `direction` (unit). `drawn` says whether a triangle counts
     /// when seen from its front (true) or back (false).
     #[must_use]
@@ -329,7 +359,8 @@ fn frame_of(soup: &Soup) -> Result<Frame, MeshError> {
 
 /// The bits of the corners, starting at the smallest: equal for the same triangle in the same turn. Adding 0.0
 /// makes -0.0 and 0.0 one.
-fn turn_key(corners: &[Vec3; 3]) -> [[u32; 3]; 3] {
+#[must_use]
+pub fn turn_key(corners: &[Vec3; 3]) -> [[u32; 3]; 3] {
     let bits = corners.map(|p| (p + Vec3::ZERO).to_array().map(f32::to_bits));
     let first = (0..3).min_by_key(|&i| bits[i]).unwrap_or(0);
     [bits[first], bits[(first + 1) % 3], bits[(first + 2) % 3]]

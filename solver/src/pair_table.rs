@@ -111,6 +111,19 @@ impl PairTable {
         self.receiver.extend(std::iter::repeat_n(self.receiver.last().copied().unwrap_or_default(), count));
     }
 
+    /// Adds the rows of a light of another table: points where `image` says, receivers counted from `first` on.
+    pub(crate) fn append(&mut self, from: &Self, rows: LightRows, first: usize, image: impl Fn(Vec3) -> Vec3) {
+        let start = self.len();
+        for p in (rows.start..rows.end).map(|i| image(from.point(i))) {
+            self.x.push(p.x);
+            self.y.push(p.y);
+            self.z.push(p.z);
+        }
+        self.vote.extend(&from.vote[rows.start..rows.end]);
+        self.receiver.extend(from.receiver[rows.start..rows.end].iter().map(|receiver| receiver + first as u32));
+        self.push_light(LightRows { start, end: self.len(), ..rows });
+    }
+
     /// Measures the box of the receivers.
     pub(crate) fn bound(&mut self) {
         let points = || (0..self.len()).map(|i| self.point(i));
@@ -142,6 +155,13 @@ impl PairTable {
     pub fn undirected(mut self) -> Self {
         self.directions = 1;
         self.lights.iter_mut().for_each(|rows| rows.direction = 0);
+        self
+    }
+
+    /// The same pairs with all votes multiplied.
+    #[must_use]
+    pub fn scaled(mut self, factor: f32) -> Self {
+        self.vote.iter_mut().for_each(|vote| *vote *= factor);
         self
     }
 

@@ -64,6 +64,13 @@ pub enum Encoding {
 /// The value 0..1 at which a distance field begins to block: a byte of 128 does, one of 127 does not.
 pub const SDF_BORDER: f32 = 0.5;
 
+/// How many texels the values of a distance field span on either side of a border: fewer, and bilinear interpolation
+/// cannot place it; more, and bytes are too coarse. Soft edges reach as far and no farther.
+pub const SDF_TEXELS: f32 = 2.0;
+
+/// What a distance field rises by from texel to texel towards a border.
+pub const SDF_PER_TEXEL: f32 = SDF_BORDER / SDF_TEXELS;
+
 /// What a rectangle blocks. The outermost ring of texels is open: 0 as coverage, below 128 in a distance field.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct OccluderTexture {
@@ -129,6 +136,15 @@ pub struct ActiveLists {
     pub lists: Vec<SectionLists>,
 }
 
+/// A level square below the model that receives its shadow and casts none. Its middle lies below the origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ground {
+    /// Where it lies along +Y, unit space.
+    pub height: f32,
+    /// Half of its side, unit space: receivers were taken from there.
+    pub half_extent: f32,
+}
+
 /// Planes, and which of them each section reads.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BakedSet {
@@ -138,6 +154,8 @@ pub struct BakedSet {
     pub sections: SectionLists,
     /// Shorter lists per light direction; without them a section reads all its planes.
     pub active: Option<ActiveLists>,
+    /// The ground that the last section is for, where there is one; no triangle belongs to that section.
+    pub ground: Option<Ground>,
 }
 
 impl BakedSet {
@@ -145,7 +163,19 @@ impl BakedSet {
     #[must_use]
     pub fn one_section(planes: Vec<BakedPlane>) -> Self {
         let all = (0..planes.len() as u32).collect();
-        Self { planes, sections: vec![all], active: None }
+        Self { planes, sections: vec![all], active: None, ground: None }
+    }
+
+    /// The number of sections that triangles belong to.
+    #[must_use]
+    pub fn model_sections(&self) -> usize {
+        self.sections.len().saturating_sub(usize::from(self.ground.is_some()))
+    }
+
+    /// The ground and its section.
+    #[must_use]
+    pub fn ground_section(&self) -> Option<(Ground, u32)> {
+        self.ground.map(|ground| (ground, self.model_sections() as u32))
     }
 
     /// Bytes of the textures, one a texel; shared ones count once.

@@ -38,8 +38,17 @@ pub struct Receivers {
     pub normals: Vec<Vec3>,
     /// Area (unit space) x exposure.
     pub weights: Vec<f32>,
-    /// The mesh's triangle that each lies on.
+    /// The mesh's triangle that each lies on; empty for those of a ground.
     pub triangles: Vec<u32>,
+}
+
+/// One receiver.
+pub(crate) struct Receiver {
+    pub point: Vec3,
+    pub normal: Vec3,
+    /// The area that it stands for.
+    pub area: f32,
+    pub triangle: Option<u32>,
 }
 
 /// Samples the drawn surface of `mesh`.
@@ -93,27 +102,38 @@ fn draw(mesh: &Mesh, strata: &Strata, options: &ReceiverOptions, count: usize) -
         return Receivers::default();
     }
     let area = (total / count as f64) as f32;
-    let one = |i: usize| -> Option<(Vec3, Vec3, Vec3, f32, u32)> {
+    let one = |i: usize| {
         let at = (i as f64 + uniform(options.seed, i as u64)) / count as f64 * total;
         let side = strata.running_area.partition_point(|&a| a <= at).min(strata.sides.len() - 1);
         let (triangle, sign) = strata.sides[side];
         let weights = barycentric(r2(options.seed, i as u64));
-        if !mesh.is_solid(triangle, weights) {
-            return None;
-        }
         let (point, normal) = (mesh.point(triangle, weights), mesh.normals[triangle as usize] * sign);
-        let origin = ray_origin(point, normal);
-        let exposure = exposure(mesh, origin, normal, options, i as u64);
-        (exposure > 0.0).then_some((point, origin, normal, area * exposure, triangle))
+        mesh.is_solid(triangle, weights).then_some(Receiver { point, normal, area, triangle: Some(triangle) })
     };
-    let drawn: Vec<_> = (0..count).into_par_iter().map(one).collect();
+    seen(mesh, count, options, one)
+}
+
+/// Those of `count` receivers that are there and that somebody can see.
+pub(crate) fn seen(
+    mesh: &Mesh,
+    count: usize,
+    options: &ReceiverOptions,
+    one: impl Fn(usize) -> Option<Receiver> + Sync,
+) -> Receivers {
+    let weighted = |i: usize| {
+        let receiver = one(i)?;
+        let origin = ray_origin(receiver.point, receiver.normal);
+        let exposure = exposure(mesh, origin, receiver.normal, options, i as u64);
+        (exposure > 0.0).then_some((receiver, origin, exposure))
+    };
+    let drawn: Vec<_> = (0..count).into_par_iter().map(weighted).collect();
     let mut receivers = Receivers::default();
-    for (point, origin, normal, weight, triangle) in drawn.into_iter().flatten() {
-        receivers.points.push(point);
+    for (receiver, origin, exposure) in drawn.into_iter().flatten() {
+        receivers.points.push(receiver.point);
         receivers.origins.push(origin);
-        receivers.normals.push(normal);
-        receivers.weights.push(weight);
-        receivers.triangles.push(triangle);
+        receivers.normals.push(receiver.normal);
+        receivers.weights.push(receiver.area * exposure);
+        receivers.triangles.extend(receiver.triangle);
     }
     receivers
 }

@@ -101,6 +101,43 @@ pub fn divide(
     (0..mesh.triangle_count()).map(section).collect()
 }
 
+/// The lights that pairs are traced under.
+pub(crate) struct Lights<'a> {
+    pub lights: Vec<Vec3>,
+    /// Those of the lists.
+    pub directions: &'a [Vec3],
+    pub solid_angle: f64,
+}
+
+impl<'a> Lights<'a> {
+    pub(crate) fn new(directions: &'a [Vec3], domain: LightDomain, options: &TraceOptions) -> Self {
+        let lights = domain.directions(options.lights, hash(options.seed, 0));
+        Self { lights, directions, solid_angle: domain.solid_angle() }
+    }
+
+    /// One in `stride` of the pairs.
+    fn evenly(&self, mesh: &Mesh, receivers: &Receivers, stride: usize) -> PairTable {
+        self.drawn(mesh, receivers, |_, _| 1.0 / stride as f32)
+    }
+
+    /// About `wanted` pairs, where shadow is undecided.
+    pub(crate) fn undecided(&self, mesh: &Mesh, receivers: &Receivers, wanted: usize, seed: u64) -> PairTable {
+        let rates = Rates::new((mesh, receivers), &self.lights, self.directions, wanted, seed);
+        self.drawn(mesh, receivers, |light, receiver| rates.of(light, receiver))
+    }
+
+    fn drawn(&self, mesh: &Mesh, receivers: &Receivers, rate: impl Fn(usize, usize) -> f32 + Sync) -> PairTable {
+        PairTable::new(&trace_drawn(mesh, receivers, &self.lights, self.solid_angle, rate), self.directions)
+    }
+}
+
+impl TraceOptions {
+    /// Receivers of each of `sections`: half of them face a light.
+    pub(crate) fn receivers(&self, sections: usize) -> usize {
+        (2 * self.pairs * self.stride / (sections.max(1) * self.lights.max(1))).max(MIN_RECEIVERS)
+    }
+}
+
 /// The pairs of each section under the lights of `domain`, for lists with the given directions. A whole model's are
 /// drawn evenly: with rates, one in 8, its planes were worse (11 of teapot_three, seed 7: 0.159 against 0.137).
 #[must_use]
@@ -116,24 +153,19 @@ pub fn trace(
     for (triangle, &section) in (0..).zip(section_of) {
         triangles[section as usize].push(triangle);
     }
-    let lights = domain.directions(options.lights, hash(options.seed, 0));
-    // Half of the receivers face a light.
-    let receivers = 2 * options.pairs * options.stride / (count.max(1) * options.lights.max(1));
+    let lights = Lights::new(directions, domain, options);
     let of_section = |(section, triangles): (usize, &Vec<u32>)| {
         let sampling = ReceiverOptions {
-            count: receivers.max(MIN_RECEIVERS),
+            count: options.receivers(count),
             exposure_rays: options.exposure_rays,
             seed: hash(options.seed, 1 + section as u64),
         };
         let receivers = sample_triangles(mesh, triangles, &sampling);
-        let undecided = (count > 1).then(|| {
-            let wanted = options.pairs / count;
-            Rates::new((mesh, &receivers), &lights, directions, wanted, hash(sampling.seed, 0))
-        });
-        let even = 1.0 / options.stride as f32;
-        let rate = |light, receiver| undecided.as_ref().map_or(even, |rates| rates.of(light, receiver));
-        let pairs = trace_drawn(mesh, &receivers, &lights, domain.solid_angle(), rate);
-        PairTable::new(&pairs, directions)
+        if count > 1 {
+            lights.undecided(mesh, &receivers, options.pairs / count, hash(sampling.seed, 0))
+        } else {
+            lights.evenly(mesh, &receivers, options.stride)
+        }
     };
     triangles.par_iter().enumerate().map(of_section).collect()
 }

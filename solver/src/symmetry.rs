@@ -11,7 +11,7 @@
 use crate::{
     lights::LightDomain,
     mesh::{Mesh, ray_origin},
-    plane::{PlacedPlane, ShadowPlane, Side},
+    plane::{Ground, PlacedPlane, ShadowPlane, Side},
     receivers::Receivers,
     visibility::{LightPairs, Pairs},
 };
@@ -141,10 +141,12 @@ impl Mirror {
     }
 }
 
-/// The plane that mirrors the mesh, its shadow and the lights onto themselves.
+/// The plane that mirrors the mesh, its shadow and the lights onto themselves, and the ground, if there is one: that
+/// is its own image where the half space of lights that it sees is.
 #[must_use]
-pub fn find(mesh: &Mesh, pilot: (&Receivers, &Pairs), domain: LightDomain) -> Option<Mirror> {
-    let mirrors = candidates(mesh).into_iter().filter(|mirror| mirror.keeps(domain));
+pub fn find(mesh: &Mesh, pilot: (&Receivers, &Pairs), domain: LightDomain, ground: Option<&Ground>) -> Option<Mirror> {
+    let keeps_ground = |mirror: &Mirror| ground.is_none() || mirror.keeps(LightDomain::Hemisphere);
+    let mirrors = candidates(mesh).into_iter().filter(|mirror| mirror.keeps(domain) && keeps_ground(mirror));
     let measured = mirrors.map(|mirror| measure(mesh, pilot, mirror));
     let holds = |m: &Measured| m.unmatched <= MAX_UNMATCHED && m.disagreement <= MAX_DISAGREEMENT;
     let best = measured.filter(holds).reduce(|a, b| if b.disagreement < a.disagreement { b } else { a });

@@ -261,6 +261,40 @@ fn axis_aligned_and_negated_directions_agree_with_the_loop() {
 }
 
 #[test]
+fn the_transmitted_share_is_the_product_over_all_surfaces_up_to_the_light() {
+    // Plates 0 to 7 upon each other, the upper ones smaller; every transmittance is a power of two, so that the
+    // product is exact.
+    let plate = |i: u32| {
+        let half = 1.0 - 0.1 * f64::from(i);
+        scenes::quad(DVec3::new(-half, 0.1 * f64::from(i), -half), DVec3::Z * 2.0 * half, DVec3::X * 2.0 * half)
+    };
+    let plates: Vec<_> = (0..8).map(plate).collect();
+    let parts: Vec<_> = plates.iter().map(|plate| (plate, Sides::Front)).collect();
+    let mesh = Mesh::new(&soup(&parts)).unwrap();
+    let of_plate = |plate: u32| match plate {
+        7 => Vec3::new(0.5, 0.25, 0.0),
+        even if even % 2 == 0 => Vec3::new(1.0, 0.5, 0.5),
+        _ => Vec3::new(0.25, 0.125, 0.125),
+    };
+    let transmittance = |triangle: u32| of_plate(mesh.source[triangle as usize] / 2);
+    for i in 0..2_000 {
+        let x = 0.95 * (2.0 * uniform(61, i) - 1.0);
+        let z = 0.95 * (2.0 * uniform(62, i) - 1.0);
+        let p = mesh.frame.unit_from_model(DVec3::new(x, -0.05, z));
+        let reach = (1.5 * uniform(63, i) / mesh.frame.radius) as f32;
+        for (direction, reach) in [(Vec3::Y, reach), (Vec3::Y, f32::INFINITY), (Vec3::NEG_Y, reach)] {
+            let end = f64::from(reach) * mesh.frame.radius - 0.05;
+            let is_met = |plate: &u32| {
+                let height = 0.1 * f64::from(*plate);
+                direction.y > 0.0 && height < end && x.abs().max(z.abs()) < 1.0 - height
+            };
+            let expected: Vec3 = (0..8).filter(is_met).map(of_plate).product();
+            assert_eq!(mesh.transmitted(p, direction, reach, transmittance), expected, "({x}, {z}) up to {reach}");
+        }
+    }
+}
+
+#[test]
 fn small_features_on_a_large_model_are_hit() {
     // A box of 1e-4 of the model's radius on a floor; the loop's margin is 4 % of the box.
     let floor = scenes::quad(DVec3::new(-1.0, 0.0, -1.0), DVec3::Z * 2.0, DVec3::X * 2.0);

@@ -50,7 +50,7 @@ fn drawn(triangles: &Triangles) -> Soup {
 
 fn found_in(triangles: &Triangles, domain: LightDomain) -> Option<Mirror> {
     let mesh = Mesh::new(&drawn(triangles)).unwrap();
-    find(&mesh, (&receivers(&mesh, PILOT.receivers, PILOT.seed), &pairs(&mesh, &PILOT)), domain)
+    find(&mesh, (&receivers(&mesh, PILOT.receivers, PILOT.seed), &pairs(&mesh, &PILOT)), domain, None)
 }
 
 fn random(seed: u64) -> Vec3 {
@@ -96,7 +96,7 @@ fn what_is_no_mirror_image_is_refused() {
     let pilot = (&receivers(&mesh, PILOT.receivers, PILOT.seed), &pairs(&mesh, &PILOT));
     let measured = measure_mirror(&mesh, pilot, Mirror::new(Vec3::X, 0.0));
     assert!(measured.disagreement > MAX_DISAGREEMENT, "{measured:?}");
-    assert_eq!(find(&mesh, pilot, LightDomain::Sphere), None);
+    assert_eq!(find(&mesh, pilot, LightDomain::Sphere, None), None);
     // Nothing to share where nothing is in shadow.
     assert_eq!(found_in(&sphere(6), LightDomain::Sphere), None);
 }

@@ -3,7 +3,7 @@
 //! Model space, metres, f64 in the shortest spelling that stands for a number; directions are f32 in theirs, so that
 //! they come back to the last bit.
 
-use super::{AssetError, AssetRequest, Bounds, Channel, Rectangle, atlas::Layout};
+use super::{AssetError, AssetRequest, Bounds, Channel, ModelGround, Rectangle, atlas::Layout};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 use serde_json::ser::{Formatter, Serializer};
@@ -33,6 +33,21 @@ pub struct PlaneSet {
     /// Shorter lists per light direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub active: Option<ActiveEntry>,
+    /// The ground that receives shadow too.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ground: Option<GroundEntry>,
+}
+
+/// A level square below the model, centred below the middle of `bounds`; it receives shadow and casts none.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct GroundEntry {
+    /// Its section: the last one, which no primitive belongs to.
+    pub section: u32,
+    /// Where it lies along +Y, metres.
+    pub height: f64,
+    /// Half of its side, metres.
+    pub half_extent: f64,
 }
 
 /// Which planes each section reads under which light.
@@ -118,7 +133,8 @@ impl Extension {
             lists: active.lists.clone(),
         };
         let (sections, active) = (request.set.sections.clone(), request.set.active.as_ref().map(entry));
-        Ok(Self { sets: vec![PlaneSet { bounds, planes, sections, active }] })
+        let ground = ground_entry(request)?;
+        Ok(Self { sets: vec![PlaneSet { bounds, planes, sections, active, ground }] })
     }
 
     /// One line.
@@ -136,6 +152,21 @@ impl Extension {
         out.push(b'\n');
         Ok(out)
     }
+}
+
+/// The request's ground.
+fn ground_entry(request: &AssetRequest<'_>) -> Result<Option<GroundEntry>, AssetError> {
+    let Some((ground, section)) = request.set.ground_section() else { return Ok(None) };
+    let ground = ModelGround::from_unit_space(&ground, request.frame);
+    let fault = |why: String| Err(AssetError::Ground { why });
+    if section == 0 {
+        return fault("it has the only section, and the model none".into());
+    }
+    if let Some((member, why)) = ground.fault() {
+        return fault(format!("{member}: {why}"));
+    }
+    let ModelGround { height, half_extent } = ground;
+    Ok(Some(GroundEntry { section, height, half_extent }))
 }
 
 /// Lists that name planes which are not there, or are not part of their section's.

@@ -71,13 +71,13 @@ pub(super) struct Block {
 }
 
 impl Labels {
-    /// Labels for the sections of `request`; none where there is one section.
+    /// Labels for the sections of `request`; none where the model has one section.
     ///
     /// # Errors
     /// Sections that do not fit the set or the scene, or more bytes than a GLB holds.
     pub(super) fn new(request: &AssetRequest<'_>, file: &GltfFile<'_>) -> Result<Self, AssetError> {
         let mut labels = Self::default();
-        if request.set.sections.len() <= 1 {
+        if request.set.model_sections() <= 1 {
             return Ok(labels);
         }
         let mut raw = None;
@@ -171,7 +171,7 @@ fn by_primitive(request: &AssetRequest<'_>) -> Result<BTreeMap<(usize, usize), V
     if origins.len() != section_of.len() || origins.is_empty() {
         return fault(format!("{} for {} triangles of the scene", section_of.len(), origins.len()));
     }
-    let count = request.set.sections.len();
+    let count = request.set.model_sections();
     let mut primitives: BTreeMap<(usize, usize), Vec<u32>> = BTreeMap::new();
     for (triangle, (origin, &section)) in origins.iter().zip(section_of).enumerate() {
         if section as usize >= count {

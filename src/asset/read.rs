@@ -5,7 +5,7 @@
 //! and those of the nodes above it are applied, so that a tool may move the whole model.
 
 use super::{
-    AssetError, Bounds, Channel, EXTENSION, ModelPlane, Rectangle, ShadowSet, atlas,
+    AssetError, Bounds, Channel, EXTENSION, ModelGround, ModelPlane, Rectangle, ShadowSet, atlas,
     extension::{is_unit, stranger},
     files,
     pointer::At,
@@ -20,6 +20,9 @@ use serde::Deserialize;
 use serde_json::Value;
 use shadowfit_solver::plane::{ActiveLists, Encoding, OccluderTexture, SectionLists, Side};
 use std::{collections::BTreeMap, io::Cursor, path::Path};
+
+/// A ground may rise by this much per metre and still be level: quaternions of f32 turn by 1e-7 too much.
+const LEVEL_TOLERANCE: f64 = 1e-6;
 
 /// Reads the shadow planes of a GLB, a glTF or a sidecar.
 ///
@@ -42,8 +45,12 @@ pub fn read(path: &Path) -> Result<ShadowSet, AssetError> {
     file.check_version().map_err(|fault| AssetError::invalid(path, fault))?;
     let (index, model_from_frame) = frame_node(&file, &root)?;
     let sets = root.member("extensions")?.member(EXTENSION)?.member("sets")?.elements()?;
-    let mut set = read_set(&index.follow(&sets)?, &mut atlases)?;
+    let at = index.follow(&sets)?;
+    let mut set = read_set(&at, &mut atlases)?;
     if model_from_frame != DAffine3::IDENTITY {
+        if set.ground.is_some() && !keeps_level(&model_from_frame) {
+            return Err(at.member("ground")?.error("not level where the node with the planes puts it".into()));
+        }
         set.transform(&model_from_frame);
     }
     Ok(set)
@@ -64,7 +71,31 @@ fn read_set(at: &At<'_>, atlases: &mut Atlases<'_>) -> Result<ShadowSet, AssetEr
         return Err(sections_at.error("one section is needed at least".into()));
     }
     let active = at.optional("active").map(|active| read_active(&active, &sections)).transpose()?;
-    Ok(ShadowSet { bounds, planes, sections, active })
+    let ground = at.optional("ground").map(|ground| read_ground(&ground, sections.len())).transpose()?;
+    Ok(ShadowSet { bounds, planes, sections, active, ground })
+}
+
+/// A ground, whose section is the last of `sections` and not the only one.
+fn read_ground(at: &At<'_>, sections: usize) -> Result<ModelGround, AssetError> {
+    let section_at = at.member("section")?;
+    let section: u32 = section_at.parse()?;
+    if section == 0 || section as usize + 1 != sections {
+        return Err(
+            section_at.error(format!("{section}, but the ground's is the last of {sections}, behind the model's"))
+        );
+    }
+    let ground = ModelGround { height: at.member("height")?.parse()?, half_extent: at.member("halfExtent")?.parse()? };
+    match ground.fault() {
+        Some((member, why)) => Err(at.member(member)?.error(why.into())),
+        None => Ok(ground),
+    }
+}
+
+/// Does the transform map level planes to level ones, and up to up?
+fn keeps_level(transform: &DAffine3) -> bool {
+    let matrix = &transform.matrix3;
+    let [across, up] = [matrix.x_axis.y.abs().max(matrix.z_axis.y.abs()), matrix.y_axis.y];
+    up > 0.0 && across <= LEVEL_TOLERANCE * up
 }
 
 fn read_active(at: &At<'_>, sections: &SectionLists) -> Result<ActiveLists, AssetError> {
@@ -248,6 +279,14 @@ impl ShadowSet {
             for direction in &mut active.directions {
                 *direction = transform.transform_vector3(direction.as_dvec3()).normalize().as_vec3();
             }
+        }
+        if let Some(ground) = &mut self.ground {
+            let below = self.bounds.centre().with_y(ground.height);
+            ground.height = transform.transform_point3(below).y;
+            // Where the scale differs by axis the square becomes a parallelogram: one of the same area.
+            let matrix = &transform.matrix3;
+            let area = matrix.x_axis.x * matrix.z_axis.z - matrix.x_axis.z * matrix.z_axis.x;
+            ground.half_extent *= area.abs().sqrt();
         }
         let Bounds { min, max } = self.bounds;
         let corner =

@@ -45,7 +45,7 @@ pub struct AssetRequest<'a> {
     pub bounds: Bounds,
     /// The planes in unit space. None means "no self-shadow".
     pub set: &'a BakedSet,
-    /// [`Scene::origins`](crate::scene::Scene::origins) of the input. Used where there are several sections.
+    /// [`Scene::origins`](crate::scene::Scene::origins) of the input. Used where the model has several sections.
     pub origins: &'a [Origin],
     /// The section of each triangle of the scene; copies of a mesh agree. Used where there are several.
     pub section_of: &'a [u32],

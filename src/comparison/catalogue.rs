@@ -3,14 +3,17 @@
 use super::{
     CompareOptions,
     bench::{Bench, World},
+    errors::SOFT_HALF_ANGLE_RAD,
 };
 use crate::render::{
     FrameRequest, RenderError,
     occluder_planes::OccluderPlanes,
+    ray_traced::RayTraced,
     shadow_map::{ShadowMap, ShadowMapOptions},
     stage::Stage,
     technique::Technique,
     unshadowed::Unshadowed,
+    vertex_visibility::{Kept, VertexVisibility, VertexVisibilityOptions},
 };
 
 /// A technique, whatever its setting.
@@ -23,8 +26,10 @@ pub enum Family {
     Planes,
     /// Shadow maps of several sizes and filters.
     ShadowMap,
-    /// Shadow maps with wide kernels, against an area light.
+    /// Shadow maps with wide kernels and shadow planes with soft edges, against an area light.
     SoftEdge,
+    /// Visibility precomputed at the vertices.
+    VertexVisibility,
 }
 
 /// What a technique's frames are compared with.
@@ -52,6 +57,13 @@ const SOFT_KERNELS: [u32; 4] = [1, 5, 9, 17];
 /// Size of the soft edge's map.
 const SOFT_SIZE: u32 = 1024;
 
+/// Radii of the light that planes are told in the soft edge: none, and that of the disc that has the area of the
+/// references' square.
+const SOFT_RADII_RAD: [f32; 2] = [0.0, SOFT_HALF_ANGLE_RAD * std::f32::consts::FRAC_2_SQRT_PI];
+
+/// What is kept at vertices, and the edges: as hard as may be, and as soft as published.
+const KEPT_AT_VERTICES: [(Kept, f32); 3] = [(Kept::Harmonics, 0.05), (Kept::Harmonics, 0.5), (Kept::BentNormal, 0.05)];
+
 /// Size of the shadow map in the scaling tests.
 const SCALED_MAP: u32 = 512;
 
@@ -75,8 +87,11 @@ impl Setting {
     }
 }
 
-/// The settings of a family on `stage`; the planes' are those of each set.
-pub(super) fn techniques(family: Family, stage: &Stage) -> Result<Vec<Box<dyn Technique>>, RenderError> {
+/// The settings of a family on `stage`, which shows what `traced` does; the planes' are those of each set.
+pub(super) fn techniques(
+    family: Family,
+    (stage, traced): (&Stage, &RayTraced),
+) -> Result<Vec<Box<dyn Technique>>, RenderError> {
     let map = |size_texels, kernel_texels| -> Result<Box<dyn Technique>, RenderError> {
         Ok(Box::new(ShadowMap::new(stage, ShadowMapOptions { size_texels, kernel_texels })?))
     };
@@ -93,16 +108,32 @@ pub(super) fn techniques(family: Family, stage: &Stage) -> Result<Vec<Box<dyn Te
                 .collect()
         }
         Family::SoftEdge => SOFT_KERNELS.map(|kernel| map(SOFT_SIZE, kernel)).into_iter().collect(),
+        Family::VertexVisibility => {
+            let kept =
+                KEPT_AT_VERTICES.map(|(kept, edge)| VertexVisibilityOptions { kept, edge, ..Default::default() });
+            kept.into_iter().map(|options| vertex_visibility((stage, traced), options)).collect()
+        }
     }
+}
+
+fn vertex_visibility(
+    (stage, traced): (&Stage, &RayTraced),
+    options: VertexVisibilityOptions,
+) -> Result<Box<dyn Technique>, RenderError> {
+    Ok(Box::new(VertexVisibility::new(stage, (traced.scene(), traced.mesh()), options)?))
 }
 
 /// What stands for a family in the scaling tests: one setting of each that shades the model itself. The planes' are
 /// those of each set.
-pub(super) fn representative(family: Family, stage: &Stage) -> Result<Option<Box<dyn Technique>>, RenderError> {
+pub(super) fn representative(
+    family: Family,
+    (stage, traced): (&Stage, &RayTraced),
+) -> Result<Option<Box<dyn Technique>>, RenderError> {
     let options = ShadowMapOptions { size_texels: SCALED_MAP, kernel_texels: 1 };
     Ok(match family {
         Family::None => Some(Box::new(Unshadowed::new(stage))),
         Family::ShadowMap => Some(Box::new(ShadowMap::new(stage, options)?)),
+        Family::VertexVisibility => Some(vertex_visibility((stage, traced), VertexVisibilityOptions::default())?),
         Family::Planes | Family::SoftEdge => None,
     })
 }
@@ -110,14 +141,23 @@ pub(super) fn representative(family: Family, stage: &Stage) -> Result<Option<Box
 impl Family {
     fn world(self) -> World {
         match self {
-            Self::None | Self::Planes | Self::ShadowMap | Self::SoftEdge => World::Model,
+            Self::None | Self::Planes | Self::ShadowMap | Self::SoftEdge | Self::VertexVisibility => World::Model,
         }
     }
 
     fn against(self) -> Against {
         match self {
             Self::SoftEdge => Against::Soft,
-            Self::None | Self::Planes | Self::ShadowMap => Against::Hard,
+            Self::None | Self::Planes | Self::ShadowMap | Self::VertexVisibility => Against::Hard,
+        }
+    }
+
+    /// Radii of the light that its planes are told; none where it has no planes.
+    fn plane_radii_rad(self) -> &'static [f32] {
+        match self {
+            Self::Planes => &SOFT_RADII_RAD[..1],
+            Self::SoftEdge => &SOFT_RADII_RAD,
+            Self::None | Self::ShadowMap | Self::VertexVisibility => &[],
         }
     }
 }
@@ -127,14 +167,16 @@ pub(super) fn settings(bench: &Bench, options: &CompareOptions) -> Result<Vec<Se
     let mut settings = Vec::new();
     for &family in &options.families {
         let (world, against) = (family.world(), family.against());
-        let made = techniques(family, &bench.stages[world.stage()])?;
-        settings.extend(made.into_iter().map(|technique| Setting { family, world, against, technique, label: None }));
-        if family == Family::Planes {
+        let made = techniques(family, (&bench.stages[world.stage()], bench.traced(world)))?;
+        let soft = (against == Against::Soft).then_some("soft edge");
+        let setting = |technique| Setting { family, world, against, technique, label: soft.map(str::to_string) };
+        settings.extend(made.into_iter().map(setting));
+        for &radius_rad in family.plane_radii_rad() {
             for (set, planes) in bench.planes.iter().enumerate() {
                 let world = World::Planes(set);
-                let technique = Box::new(OccluderPlanes::new(&bench.stages[world.stage()], &planes.set)?);
-                let label = Some(planes.label.clone());
-                settings.push(Setting { family, world, against, technique, label });
+                let technique = OccluderPlanes::soft(&bench.stages[world.stage()], &planes.set, radius_rad)?;
+                let label = std::iter::once(&*planes.label).chain(soft).collect::<Vec<_>>().join(", ");
+                settings.push(Setting { family, world, against, technique: Box::new(technique), label: Some(label) });
             }
         }
     }

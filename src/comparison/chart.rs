@@ -14,8 +14,8 @@ use kuva::{
 /// Okabe and Ito, "Color Universal Design" (2008), for series in turn; shapes tell those apart that share one.
 const COLORS: [&str; 7] = ["#000000", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 
-/// The chart of hard self-shadows under a moving light.
-pub(super) fn svg(comparison: &Comparison) -> String {
+/// The chart of hard self-shadows under a moving light; none where no technique is ever wrong (a convex body).
+pub(super) fn svg(comparison: &Comparison) -> Option<String> {
     let mut families: Vec<Family> = comparison.rows.iter().map(|row| row.family).collect();
     families.dedup();
     let mut plots = Vec::new();
@@ -40,12 +40,24 @@ pub(super) fn svg(comparison: &Comparison) -> String {
             .with_size(5.0);
         plots.push(Plot::Scatter(series));
     }
+    let (low, high) = decades(comparison)?;
     let layout = Layout::auto_from_plots(&plots)
         .with_title(format!("{}: speed against error", comparison.model))
         .with_x_label("frame time under a moving light, against no shadows")
         .with_y_label("wrong share of the pixels")
         .with_width(1100.0)
         .with_height(760.0)
-        .with_log_scale();
-    SvgBackend.render_scene(&render_multiple(plots, layout))
+        .with_log_scale()
+        .with_y_axis_min(low)
+        .with_y_axis_max(high);
+    Some(SvgBackend.render_scene(&render_multiple(plots, layout)))
+}
+
+/// The powers of ten around all errors.
+fn decades(comparison: &Comparison) -> Option<(f64, f64)> {
+    let errors = comparison.rows.iter().map(|row| row.errors.mask_error).filter(|error| *error > 0.0);
+    let logs: Vec<f64> = errors.map(f64::log10).collect();
+    let low = logs.iter().copied().reduce(f64::min)?.floor();
+    let high = logs.iter().copied().reduce(f64::max)?.ceil().max(low + 1.0);
+    Some((10f64.powf(low), 10f64.powf(high)))
 }

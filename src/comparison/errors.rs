@@ -32,7 +32,7 @@ pub struct Errors {
     /// The part that has too much.
     #[serde(rename = "false")]
     pub false_: f64,
-    /// Mean FLIP of the shaded frames of the first light; `null` without the cargo feature `flip`.
+    /// Mean FLIP of the shaded frames of the first view; `null` without the cargo feature `flip`.
     pub flip_mean: Option<f64>,
     /// Frames.
     pub frames: usize,
@@ -72,6 +72,7 @@ pub(super) fn measure(
     for view in 0..options.views {
         for world in [World::Model, World::Ground] {
             let seen = bench.traced(world).look(&bench.request(world, (view, 0), Mode::Mask))?;
+            let shown = if view == 0 { Some(light_to_show(bench, world, &seen, options.lights)?) } else { None };
             for light in 0..options.lights {
                 progress(format!("errors: view {} of {}, light {}", view + 1, options.views, light + 1));
                 for against in [Against::Hard, Against::Soft] {
@@ -84,7 +85,8 @@ pub(super) fn measure(
                     }
                     let reference = reference(bench, (world, against), &seen, (view, light))?;
                     for (setting, sums) in settings.iter_mut().zip(&mut sums).filter(|(setting, _)| same(setting)) {
-                        pictures.extend(compare(bench, setting, sums, (&reference, view, light))?);
+                        let picture = compare(bench, setting, sums, (&reference, view, light))?;
+                        pictures.extend(picture.filter(|_| shown == Some(light)));
                     }
                 }
             }
@@ -130,7 +132,19 @@ fn reference(
     Ok(Reference { mask: picture(Mode::Mask)?, shaded: picture(Mode::Shaded)?, counts })
 }
 
-/// Adds a frame's errors; of the first frame also makes the picture.
+/// The light under which most of the view is in shadow.
+fn light_to_show(bench: &Bench, world: World, seen: &View, lights: usize) -> Result<usize, RenderError> {
+    let mut most = (0, 0);
+    for light in 0..lights {
+        let view = RayTraced::relit(seen, Mode::Mask, bench.request(world, (0, light), Mode::Mask).light);
+        let mask = bench.traced(world).picture(&view)?;
+        let in_shadow = mask.pixels().filter(|pixel| pixel.0[1] == 255 && pixel.0[0] == 0).count();
+        most = most.max((in_shadow, lights - light));
+    }
+    Ok(lights - most.1)
+}
+
+/// Adds a frame's errors; of the first view also makes a picture, and measures FLIP.
 fn compare(
     bench: &mut Bench,
     setting: &mut Setting,
@@ -143,15 +157,12 @@ fn compare(
     let errors = MaskErrors::where_seen(&reference.mask, &mask, |pixel| reference.counts[pixel]);
     sums.masks = sums.masks.plus(errors);
     sums.frames += 1;
-    // FLIP takes longer than the frame: one light.
-    if light > 0 {
+    // FLIP takes longer than the frame: one view.
+    if view > 0 {
         return Ok(None);
     }
     let shaded = draw(bench, setting, &request(bench, Mode::Shaded))?;
     sums.flips.extend(mean_flip(&reference.shaded, &shaded));
-    if view > 0 {
-        return Ok(None);
-    }
     let pictures = [&reference.shaded, &shaded, &difference(&reference.mask, &mask)];
     Ok(Some(Picture { name: slug(&setting.name()), picture: side_by_side(&pictures) }))
 }

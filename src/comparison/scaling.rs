@@ -108,7 +108,7 @@ fn techniques(
                 out.push((1 + set, format!("{}, {}", technique.name(), planes.label), technique));
             }
         }
-        if let Some(technique) = catalogue::representative(family, &stages[0])? {
+        if let Some(technique) = catalogue::representative(family, (&stages[0], &bench.model))? {
             out.push((0, technique.name(), technique));
         }
     }

@@ -14,7 +14,7 @@ use super::{
 use glam::Vec4;
 use rayon::prelude::*;
 use shadowfit_solver::{
-    plane::BakedSet,
+    plane::{BakedSet, SectionLists},
     shade::{self, PlaneRows},
 };
 
@@ -47,11 +47,18 @@ pub(crate) struct Casting {
     pub view: wgpu::TextureView,
     texels: Vec<Texel>,
     instances: usize,
+    light_radius_rad: f32,
 }
 
 impl Casting {
-    /// For `instances` instances that read `set`, whose textures lie in `slots`.
-    pub fn new(gpu: &Gpu, set: &BakedSet, slots: &[Slot], instances: usize) -> Result<Self, RenderError> {
+    /// For `instances` instances that read `set`, whose textures lie in `slots`, under directional lights of an angular
+    /// radius.
+    pub fn new(
+        gpu: &Gpu,
+        (set, light_radius_rad): (&BakedSet, f32),
+        slots: &[Slot],
+        instances: usize,
+    ) -> Result<Self, RenderError> {
         let planes = set.planes.iter().zip(slots).map(|(baked, slot)| {
             let [equation, a, b] = plane_and_duals(&baked.plane);
             Prepared {
@@ -80,7 +87,16 @@ impl Casting {
         });
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         let texels = vec![[0; 4]; rows * ROW_TEXELS];
-        Ok(Self { planes: planes.collect(), sections, instance_texels, texture, view, texels, instances })
+        Ok(Self {
+            planes: planes.collect(),
+            sections,
+            instance_texels,
+            texture,
+            view,
+            texels,
+            instances,
+            light_radius_rad,
+        })
     }
 
     /// The pipeline constants of planes.wgsl that tell where a texel is.
@@ -95,8 +111,12 @@ impl Casting {
         size_of_val(&self.texels[..])
     }
 
-    /// Does some instance read planes in a section (by its label) under the light of the last update?
-    pub fn is_read(&self, label: u32) -> bool {
+    /// Does some instance ask for planes in a section (by its label) under the light of the last update? A light of some
+    /// size has a soft horizon everywhere.
+    pub fn is_asked(&self, label: u32) -> bool {
+        if self.light_radius_rad > 0.0 {
+            return true;
+        }
         let section = (label as usize).min(self.sections);
         let blocks = self.texels.chunks_exact(self.instance_texels).take(self.instances);
         blocks.map(|block| block[section]).any(|[start, end, ..]| start < end)
@@ -105,6 +125,14 @@ impl Casting {
     /// Computes the texels under `light` (world space) and sends them.
     pub fn update(&mut self, gpu: &Gpu, set: &BakedSet, placements: &[Placement], light: &Light) {
         let (planes, sections, stride) = (&self.planes, self.sections, self.instance_texels);
+        let under = |plane: usize, light: &Light| match *light {
+            Light::Directional { to_light } if self.light_radius_rad > 0.0 => {
+                let texels = planes[plane].under(light)?;
+                let softening = shade::softening(&set.planes[plane], to_light, self.light_radius_rad);
+                Some(CastingTexels { slot: texels.slot.with_softening(softening), ..texels })
+            }
+            _ => planes[plane].under(light),
+        };
         let blocks = self.texels.par_chunks_exact_mut(stride).zip(placements).enumerate();
         blocks.for_each(|(instance, (block, placement))| {
             let light = placement.light_unit(light);
@@ -113,7 +141,7 @@ impl Casting {
             for section in 0..=sections {
                 let start = end;
                 for &plane in lists.get(section).map_or(&[][..], Vec::as_slice) {
-                    if let Some(casting) = planes[plane as usize].under(&light) {
+                    if let Some(casting) = under(plane as usize, &light) {
                         block[end..end + PLANE_TEXELS].copy_from_slice(bytemuck::cast_slice(&[casting]));
                         end += PLANE_TEXELS;
                     }
@@ -146,8 +174,12 @@ impl Prepared {
     }
 }
 
+/// All lists that a light may choose.
+pub(crate) fn choices(set: &BakedSet) -> impl Iterator<Item = &SectionLists> {
+    set.active.iter().flat_map(|active| &active.lists).chain([&set.sections])
+}
+
 /// Planes in all lists of a set, under the light where there are most.
 fn longest(set: &BakedSet) -> usize {
-    let choices = set.active.iter().flat_map(|active| &active.lists).chain([&set.sections]);
-    choices.map(|lists| lists.iter().map(Vec::len).sum()).max().unwrap_or(0)
+    choices(set).map(|lists| lists.iter().map(Vec::len).sum()).max().unwrap_or(0)
 }

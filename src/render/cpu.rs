@@ -202,6 +202,8 @@ pub struct Turntable<'a> {
     scene: &'a Scene,
     mesh: &'a Mesh,
     set: BakedSet,
+    /// Of directional lights; 0: hard edges.
+    light_radius_rad: f32,
     /// Of the last frame: a second light from the same camera traces nothing.
     primary: Option<(Camera, Primary)>,
 }
@@ -210,12 +212,18 @@ impl<'a> Turntable<'a> {
     /// Draws `scene`, whose triangles `mesh` holds. There are no planes yet.
     #[must_use]
     pub fn new(scene: &'a Scene, mesh: &'a Mesh) -> Self {
-        Self { scene, mesh, set: BakedSet::default(), primary: None }
+        Self { scene, mesh, set: BakedSet::default(), light_radius_rad: 0.0, primary: None }
     }
 
     /// Replaces the planes (unit space) that cast in the frames to come.
     pub fn set_planes(&mut self, set: &BakedSet) {
+        self.set_soft_planes(set, 0.0);
+    }
+
+    /// The same with soft edges under directional lights of an angular radius.
+    pub fn set_soft_planes(&mut self, set: &BakedSet, light_radius_rad: f32) {
         self.set = set.clone();
+        self.light_radius_rad = light_radius_rad;
     }
 
     /// Draws a frame.
@@ -243,6 +251,16 @@ impl<'a> Turntable<'a> {
         };
         let planes = &self.set.planes;
         match request.light {
+            Light::Directional { to_light } if self.light_radius_rad > 0.0 => {
+                let (rows, radius_rad) = (shade::set_rows(&self.set, to_light), self.light_radius_rad);
+                let softening: Vec<f32> =
+                    planes.iter().map(|baked| shade::softening(baked, to_light, radius_rad)).collect();
+                let visibility = |hit: &PrimaryHit| {
+                    shade::horizon(hit.normal.dot(to_light), radius_rad.sin())
+                        * shade::visibility_soft(planes, (&rows, &softening), list(hit), hit.p_unit)
+                };
+                primary.picture(models, options.mode, &request.light, visibility)
+            }
             Light::Directional { to_light } => {
                 let rows = shade::set_rows(&self.set, to_light);
                 let visibility = |hit: &PrimaryHit| shade::visibility(planes, &rows, list(hit), hit.p_unit);

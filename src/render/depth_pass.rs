@@ -3,10 +3,10 @@
 //! A pass without colour. Batches without holes need no fragment stage. Back faces cast too: a soup has no outside.
 
 use super::{
-    bindings::{STORAGE, buffer, group, layout},
     forward::{pipeline_layout, vertex_buffer},
     gpu::DEPTH,
     stage::{Part, Stage},
+    view_matrices::ViewMatrices,
 };
 use glam::Mat4;
 
@@ -17,22 +17,16 @@ pub(crate) const MAP_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32F
 #[derive(Debug)]
 pub(crate) struct DepthPass {
     pipelines: [wgpu::RenderPipeline; 2],
-    matrices: Vec<wgpu::Buffer>,
-    groups: Vec<wgpu::BindGroup>,
+    matrices: ViewMatrices,
 }
 
 impl DepthPass {
     /// For up to `views` views of a frame (a point light has six), with the rasteriser's depth bias.
     pub fn new(stage: &Stage, views: usize, bias: wgpu::DepthBiasState) -> Self {
         let gpu = &stage.gpu;
-        let group_layout = layout(gpu, "depth pass", &[(wgpu::ShaderStages::VERTEX, STORAGE)]);
-        let count = stage.placements().len();
-        let matrices: Vec<_> =
-            (0..views).map(|_| buffer::<Mat4>(gpu, "light matrices", count, wgpu::BufferUsages::STORAGE)).collect();
-        let bind = |buffer: &wgpu::Buffer| group(gpu, &group_layout, &[buffer.as_entire_binding()]);
-        let groups = matrices.iter().map(bind).collect();
+        let matrices = ViewMatrices::new(stage, views);
         let module = gpu.module(&DEPTH);
-        let layout = pipeline_layout(stage, Some(&group_layout));
+        let layout = pipeline_layout(stage, Some(&matrices.layout));
         let pipelines = [false, true].map(|has_holes| {
             let constants = [("POINT_LIGHT", 0.0), ("AMBIENT", 0.0), ("DIFFUSE", 0.0)];
             let compilation_options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
@@ -64,20 +58,19 @@ impl DepthPass {
                 cache: None,
             })
         });
-        Self { pipelines, matrices, groups }
+        Self { pipelines, matrices }
     }
 
-    /// Clears `target` and draws the casters of all instances into it, as view number `view` of this frame.
+    /// Clears `target` and draws the casters of all instances into it: the number of the view in this frame, and its clip
+    /// space from world space.
     pub fn record(
         &self,
         stage: &Stage,
-        (view, clip_from_world): (usize, Mat4),
+        view: (usize, Mat4),
         target: &wgpu::TextureView,
         encoder: &mut wgpu::CommandEncoder,
     ) {
-        let of_instance = |placement: &super::stage::Placement| clip_from_world * placement.world_from_unit();
-        let matrices: Vec<Mat4> = stage.placements().iter().map(of_instance).collect();
-        stage.gpu.queue.write_buffer(&self.matrices[view], 0, bytemuck::cast_slice(&matrices));
+        let matrices = self.matrices.send(stage, view);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("depth"),
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
@@ -88,12 +81,12 @@ impl DepthPass {
             ..Default::default()
         });
         stage.bind(&mut pass);
-        pass.set_bind_group(2, &self.groups[view], &[]);
+        pass.set_bind_group(2, matrices, &[]);
         stage.draw(&mut pass, Part::Casters, |batch| &self.pipelines[usize::from(batch.has_holes)]);
     }
 
     /// Bytes of its buffers.
     pub fn buffer_bytes(&self) -> usize {
-        self.matrices.iter().map(|buffer| buffer.size() as usize).sum()
+        self.matrices.bytes()
     }
 }

@@ -37,6 +37,10 @@ pub(crate) struct ForwardOptions {
     pub stencil: wgpu::StencilState,
     /// How colours mix with what is there.
     pub blend: Option<wgpu::BlendState>,
+    /// Which channels are written.
+    pub write_mask: wgpu::ColorWrites,
+    /// Which faces of single-sided triangles are left out.
+    pub cull_mode: Option<wgpu::Face>,
 }
 
 impl Default for ForwardOptions {
@@ -48,6 +52,8 @@ impl Default for ForwardOptions {
             depth_write: true,
             stencil: wgpu::StencilState::default(),
             blend: None,
+            write_mask: wgpu::ColorWrites::ALL,
+            cull_mode: Some(wgpu::Face::Back),
         }
     }
 }
@@ -121,7 +127,8 @@ impl Forward {
             ("DIFFUSE", f64::from(DIFFUSE)),
         ]);
         let compilation_options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
-        let target = wgpu::ColorTargetState { blend: self.options.blend, ..color_format(key.mode).into() };
+        let ForwardOptions { blend, write_mask, cull_mode, .. } = self.options;
+        let target = wgpu::ColorTargetState { format: color_format(key.mode), blend, write_mask };
         gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(entry_point),
             layout: Some(&self.layout),
@@ -132,7 +139,7 @@ impl Forward {
                 buffers: &[Some(vertex_buffer())],
             },
             primitive: wgpu::PrimitiveState {
-                cull_mode: if key.double_sided { None } else { Some(wgpu::Face::Back) },
+                cull_mode: if key.double_sided { None } else { cull_mode },
                 ..Default::default()
             },
             depth_stencil: Some(wgpu::DepthStencilState {

@@ -42,7 +42,12 @@ macro_rules! forward {
 pub const CONSTANT_VISIBILITY: Shader = forward!("constant_visibility", "constant_visibility.wgsl");
 /// The model with shadow planes.
 pub const OCCLUDER_PLANES: Shader = forward!("occluder_planes", "planes.wgsl", "occluder_planes.wgsl");
-/// The same, with lines where the planes cut it.
+/// The same with coordinates interpolated from the vertices.
+pub const VERTEX_COORDINATES: Shader = Shader {
+    name: "vertex_coordinates",
+    parts: parts!["frame.wgsl", "surface.wgsl", "planes.wgsl", "vertex_coordinates.wgsl"],
+};
+/// The model with shadow planes, with lines where the planes cut it.
 pub const PLANE_CUTS: Shader =
     forward!("plane_cuts", "planes.wgsl", "occluder_planes.wgsl", "rectangles.wgsl", "plane_cuts.wgsl");
 /// The planes drawn through the model.
@@ -53,9 +58,50 @@ pub const PLANE_RECTANGLES: Shader = Shader {
 /// The casters' depth from a light.
 pub const DEPTH: Shader = Shader { name: "depth", parts: parts!["frame.wgsl", "surface.wgsl", "depth.wgsl"] };
 /// The model with a shadow map.
-pub const SHADOW_MAP: Shader = forward!("shadow_map", "shadow_map.wgsl");
+pub const SHADOW_MAP: Shader = forward!("shadow_map", "light_views.wgsl", "shadow_map.wgsl");
+/// Shadow volumes into the stencil.
+pub const STENCIL_VOLUMES: Shader =
+    Shader { name: "stencil_volumes", parts: parts!["frame.wgsl", "volumes.wgsl", "stencil_volumes.wgsl"] };
+/// Where the silhouette, as a light sees it, passes through the texels of a map.
+pub const SILHOUETTE_POINTS: Shader = Shader { name: "silhouette_points", parts: parts!["silhouette_points.wgsl"] };
+/// The model with a shadow silhouette map.
+pub const SILHOUETTE_MAP: Shader = forward!("silhouette_map", "light_views.wgsl", "silhouette_map.wgsl");
+/// The casters flattened onto a plane.
+pub const PLANAR: Shader = Shader { name: "planar", parts: parts!["frame.wgsl", "surface.wgsl", "planar.wgsl"] };
+/// Where the casters are, as a light sees them.
+pub const SILHOUETTE: Shader =
+    Shader { name: "silhouette", parts: parts!["frame.wgsl", "surface.wgsl", "depth.wgsl", "silhouette.wgsl"] };
+/// The ground with that silhouette projected onto it.
+pub const PROJECTIVE_TEXTURE: Shader = forward!("projective_texture", "light_views.wgsl", "projective_texture.wgsl");
+/// The ground with a soft shadow.
+pub const SOFT_PLANAR: Shader = forward!("soft_planar", "soft_planar.wgsl");
+/// Shadow volumes into a float target.
+pub const TRANSPARENT_VOLUMES: Shader =
+    Shader { name: "transparent_volumes", parts: parts!["frame.wgsl", "volumes.wgsl", "transparent_volumes.wgsl"] };
+/// The model in the light that these leave.
+pub const TRANSPARENT: Shader = forward!("transparent", "transparent.wgsl");
+/// The model with visibility precomputed at its vertices.
+pub const VERTEX_VISIBILITY: Shader = forward!("vertex_visibility", "vertex_visibility.wgsl");
 /// All passes.
-pub const SHADERS: &[Shader] = &[CONSTANT_VISIBILITY, OCCLUDER_PLANES, PLANE_CUTS, PLANE_RECTANGLES, DEPTH, SHADOW_MAP];
+pub const SHADERS: &[Shader] = &[
+    CONSTANT_VISIBILITY,
+    OCCLUDER_PLANES,
+    VERTEX_COORDINATES,
+    PLANE_CUTS,
+    PLANE_RECTANGLES,
+    DEPTH,
+    SHADOW_MAP,
+    PLANAR,
+    SILHOUETTE,
+    PROJECTIVE_TEXTURE,
+    SOFT_PLANAR,
+    STENCIL_VOLUMES,
+    SILHOUETTE_POINTS,
+    SILHOUETTE_MAP,
+    TRANSPARENT_VOLUMES,
+    TRANSPARENT,
+    VERTEX_VISIBILITY,
+];
 
 /// Features that some technique uses, asked for where the adapter has them.
 const WANTED: wgpu::Features = wgpu::Features::DEPTH_CLIP_CONTROL

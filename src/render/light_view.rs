@@ -12,7 +12,7 @@ use glam::{Mat4, Vec3, Vec4};
 
 /// Extreme points are taken in a few hundred directions; between two the surface may bulge by this share of the extent:
 /// 0.4 % of a sphere.
-const BULGE: f32 = 0.005;
+pub(crate) const BULGE: f32 = 0.005;
 
 /// Nearest depth of a point light's faces, of the reach of the farthest caster: nearer casters are cut off.
 const NEAREST: f32 = 1e-3;

@@ -2,24 +2,28 @@
 //!
 //! One forward pass. The affine rows of each plane (thesis eq. 2-8, see `solver::shade`) are computed on the CPU once
 //! per light and instance, and the lists of the sections chosen; a plane that casts nothing under that light is in none
-//! of them, so it costs no fragment anything.
+//! of them, so it costs no fragment anything. Under a directional light of some size edges are soft where textures are
+//! distance fields; for a light without size nothing is asked, so that hard edges pay nothing.
 
 use super::{
-    FrameRequest, Mode, RenderError,
+    FrameRequest, Light, Mode, RenderError,
     atlas::{Atlas, Slot},
     bindings::{Binding, INTEGERS, SAMPLER, group, layout, texture},
-    casting::Casting,
+    casting::{Casting, choices},
     forward::{Forward, ForwardOptions},
-    gpu::{CONSTANT_VISIBILITY, Gpu, OCCLUDER_PLANES},
+    gpu::{CONSTANT_VISIBILITY, Gpu, OCCLUDER_PLANES, VERTEX_COORDINATES},
     plane_view::PlaneView,
     stage::{Begin, Part, Stage, Targets},
     technique::{Cost, Technique},
 };
 use shadowfit_solver::{
-    plane::{BakedSet, SDF_BORDER},
-    shade::EDGE_ON,
+    plane::{BakedSet, SDF_BORDER, SDF_PER_TEXEL},
+    shade::{EDGE_ON, MIN_SPREAD},
 };
 use wgpu::util::{DeviceExt, TextureDataOrder};
+
+/// Name of the variant with coordinates at vertices.
+const PER_VERTEX: &str = "occluder planes, per vertex";
 
 /// Bindings 0 to 2 of group 2, those of planes.wgsl.
 pub(crate) const BINDINGS: [Binding; 3] = [
@@ -28,10 +32,24 @@ pub(crate) const BINDINGS: [Binding; 3] = [
     (wgpu::ShaderStages::FRAGMENT, SAMPLER),
 ];
 
+/// Where the coordinates on the planes are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Coordinates {
+    PerFragment,
+    PerVertex,
+}
+
+/// Most planes of a list whose coordinates are computed at vertices; MOST of vertex_coordinates.wgsl. The model's own
+/// attributes and two locations a plane leave room for no fifth among the 15 that every adapter has.
+const MOST_AT_VERTICES: usize = 4;
+
 /// Draws the model with the shadows of a baked set.
 #[derive(Debug)]
 pub struct OccluderPlanes {
     set: BakedSet,
+    /// Angular radius of directional lights; 0: hard edges.
+    light_radius_rad: f32,
+    coordinates: Coordinates,
     /// One a plane.
     slots: Vec<Slot>,
     atlas_bytes: usize,
@@ -53,6 +71,34 @@ impl OccluderPlanes {
     /// # Errors
     /// Their textures exceed the adapter's limits, or the driver reports an error.
     pub fn new(stage: &Stage, set: &BakedSet) -> Result<Self, RenderError> {
+        Self::soft(stage, set, 0.0)
+    }
+
+    /// The same with coordinates that are interpolated from the vertices, as in the thesis. Point lights are refused:
+    /// coordinates under them are not affine.
+    ///
+    /// # Errors
+    /// As of [`OccluderPlanes::new`], and [`RenderError::Unsupported`] where a section reads more than 4 planes.
+    pub fn per_vertex(stage: &Stage, set: &BakedSet) -> Result<Self, RenderError> {
+        if choices(set).flatten().any(|list| list.len() > MOST_AT_VERTICES) {
+            return Err(RenderError::Unsupported { technique: PER_VERTEX, feature: "lists of at most 4 planes" });
+        }
+        Self::with(stage, set, (0.0, Coordinates::PerVertex))
+    }
+
+    /// The same with soft edges: directional lights have this angular radius (the sun: 0.0047), 0 to pi/4.
+    ///
+    /// # Errors
+    /// As of [`OccluderPlanes::new`].
+    pub fn soft(stage: &Stage, set: &BakedSet, light_radius_rad: f32) -> Result<Self, RenderError> {
+        Self::with(stage, set, (light_radius_rad, Coordinates::PerFragment))
+    }
+
+    fn with(
+        stage: &Stage,
+        set: &BakedSet,
+        (light_radius_rad, coordinates): (f32, Coordinates),
+    ) -> Result<Self, RenderError> {
         let gpu = &stage.gpu;
         let limits = gpu.limits();
         let textures: Vec<_> = set.planes.iter().map(|baked| &baked.texture).collect();
@@ -64,18 +110,38 @@ impl OccluderPlanes {
             min_filter: wgpu::FilterMode::Linear,
             ..Default::default()
         });
-        let casting = Casting::new(gpu, set, &atlas.slots, stage.placements().len())?;
-        let constants = [("EDGE_ON", f64::from(EDGE_ON)), ("SDF_BORDER", f64::from(SDF_BORDER))];
-        let constants: Vec<_> = constants.into_iter().chain(casting.constants()).collect();
+        let casting = Casting::new(gpu, (set, light_radius_rad), &atlas.slots, stage.placements().len())?;
+        let mut constants: Vec<_> = CONSTANTS.map(|(name, value)| (name, f64::from(value))).to_vec();
+        constants.extend(casting.constants());
         let group_layout = layout(gpu, "planes", &BINDINGS);
         let options = ForwardOptions { constants: vec![("VISIBILITY", 1.0)], ..Default::default() };
         let bare = Forward::new(stage, &CONSTANT_VISIBILITY, None, options);
-        let options = ForwardOptions { constants: constants.clone(), ..Default::default() };
-        let forward = Forward::new(stage, &OCCLUDER_PLANES, Some(&group_layout), options);
+        let mut options = ForwardOptions { constants: with_light(&constants, light_radius_rad), ..Default::default() };
+        let mut shader = &OCCLUDER_PLANES;
+        if coordinates == Coordinates::PerVertex {
+            options.constants.clone_from(&constants);
+            options.entry_points = ["vs_coordinates", "fs_coordinates_shaded", "fs_coordinates_mask"];
+            shader = &VERTEX_COORDINATES;
+        }
+        let forward = Forward::new(stage, shader, Some(&group_layout), options);
         let group = group(gpu, &group_layout, &resources(&casting, &occluders, &sampler));
         gpu.check()?;
         let (set, slots, atlas_bytes) = (set.clone(), atlas.slots, atlas.rgba.len());
-        Ok(Self { set, slots, atlas_bytes, casting, constants, occluders, sampler, group, bare, forward, view: None })
+        Ok(Self {
+            set,
+            light_radius_rad,
+            coordinates,
+            slots,
+            atlas_bytes,
+            casting,
+            constants,
+            occluders,
+            sampler,
+            group,
+            bare,
+            forward,
+            view: None,
+        })
     }
 
     /// The planes and where their textures lie.
@@ -83,7 +149,12 @@ impl OccluderPlanes {
         (&self.set, &self.slots)
     }
 
-    /// The pipeline constants of planes.wgsl.
+    /// The pipeline constants of planes.wgsl and occluder_planes.wgsl.
+    pub(crate) fn forward_constants(&self) -> Vec<(&'static str, f64)> {
+        with_light(&self.constants, self.light_radius_rad)
+    }
+
+    /// Those of planes.wgsl.
     pub(crate) fn constants(&self) -> &[(&'static str, f64)] {
         &self.constants
     }
@@ -96,7 +167,11 @@ impl OccluderPlanes {
 
 impl Technique for OccluderPlanes {
     fn name(&self) -> String {
-        "occluder planes".to_string()
+        match self.light_radius_rad {
+            _ if self.coordinates == Coordinates::PerVertex => PER_VERTEX.to_string(),
+            0.0 => "occluder planes".to_string(),
+            radius_rad => format!("occluder planes, light radius {:.2} deg", radius_rad.to_degrees()),
+        }
     }
 
     fn update(
@@ -105,6 +180,9 @@ impl Technique for OccluderPlanes {
         request: &FrameRequest,
         _: &mut wgpu::CommandEncoder,
     ) -> Result<(), RenderError> {
+        if self.coordinates == Coordinates::PerVertex && matches!(request.light, Light::Point { .. }) {
+            return Err(RenderError::Unsupported { technique: PER_VERTEX, feature: "a directional light" });
+        }
         self.casting.update(&stage.gpu, &self.set, stage.placements(), &request.light);
         Ok(())
     }
@@ -124,17 +202,19 @@ impl Technique for OccluderPlanes {
         }
         let mut pass = targets.begin(encoder, (request.options.mode, Begin::Clear));
         let casting = &self.casting;
-        self.bare.draw_sections(stage, request, targets, (&mut pass, Part::All, &|label| !casting.is_read(label)));
+        self.bare.draw_sections(stage, request, targets, (&mut pass, Part::All, &|label| !casting.is_asked(label)));
         pass.set_bind_group(2, &self.group, &[]);
-        self.forward.draw_sections(stage, request, targets, (&mut pass, Part::All, &|label| casting.is_read(label)));
+        self.forward.draw_sections(stage, request, targets, (&mut pass, Part::All, &|label| casting.is_asked(label)));
         Ok(())
     }
 
     fn cost(&self, stage: &Stage) -> Cost {
         Cost {
             passes: 1,
-            draw_calls: stage.calls_over(&|label| self.casting.is_read(label))
-                + stage.calls_over(&|label| !self.casting.is_read(label)),
+            draw_calls: [true, false]
+                .map(|asked| stage.calls_over(&|label| self.casting.is_asked(label) == asked))
+                .iter()
+                .sum(),
             update_passes: 0,
             update_draw_calls: 0,
             texture_bytes: self.atlas_bytes + self.casting.bytes(),
@@ -142,6 +222,17 @@ impl Technique for OccluderPlanes {
             on_light_change: "three rows a casting plane and the sections' lists, per instance, on the CPU".to_string(),
         }
     }
+}
+
+/// The pipeline constants of planes.wgsl that are constants of the solver.
+const CONSTANTS: [(&str, f32); 4] =
+    [("EDGE_ON", EDGE_ON), ("SDF_BORDER", SDF_BORDER), ("SDF_PER_TEXEL", SDF_PER_TEXEL), ("MIN_SPREAD", MIN_SPREAD)];
+
+/// Those of planes.wgsl and of occluder_planes.wgsl.
+fn with_light(constants: &[(&'static str, f64)], light_radius_rad: f32) -> Vec<(&'static str, f64)> {
+    let mut all = constants.to_vec();
+    all.push(("LIGHT_SINE", f64::from(light_radius_rad.sin())));
+    all
 }
 
 fn resources<'a>(

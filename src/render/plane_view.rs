@@ -51,7 +51,7 @@ impl PlaneView {
         let group = group(gpu, &group_layout, &[casting, occluders, sampler, rectangles.as_entire_binding()]);
         let options = ForwardOptions {
             entry_points: ["vs_surface", "fs_plane_cuts", "fs_mask"],
-            constants: technique.constants().to_vec(),
+            constants: technique.forward_constants(),
             ..Default::default()
         };
         let cuts = Forward::new(stage, &PLANE_CUTS, Some(&group_layout), options);

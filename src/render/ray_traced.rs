@@ -127,6 +127,20 @@ impl RayTraced {
         view.primary.picture((&self.scene, &self.mesh), view.mode, &light, visibility)
     }
 
+    /// Hard shadows of the view's light where materials let light through ([`Material::transmittance`]): the product over
+    /// all surfaces on the way, the mean of its colours. [`RayTraced::picture`] takes such materials for opaque. What the
+    /// camera would see through them is not drawn.
+    ///
+    /// [`Material::transmittance`]: crate::scene::Material::transmittance
+    ///
+    /// # Errors
+    /// [`RenderError::NeedsAdapter`] for [`Mode::Planes`].
+    pub fn transmitted_picture(&self, view: &View) -> Result<image::RgbaImage, RenderError> {
+        let light = self.moved(view.light);
+        let visibility = |hit: &PrimaryHit| self.transmitted(hit, &light).element_sum() / 3.0;
+        view.primary.picture((&self.scene, &self.mesh), view.mode, &light, visibility)
+    }
+
     /// Soft shadows of `side` x `side` samples of an area light, in the place of the view's light.
     ///
     /// # Errors
@@ -162,5 +176,16 @@ impl RayTraced {
             Light::Directional { to_light } => !self.mesh.is_blocked(origin, to_light),
             Light::Point { position } => !self.mesh.is_blocked_before(origin, position),
         }
+    }
+
+    /// The share of the light that arrives at a hit, per colour; `light` is in mesh space.
+    fn transmitted(&self, hit: &PrimaryHit, light: &Light) -> Vec3 {
+        let origin = ray_origin(hit.p_unit, hit.normal);
+        let to_light = light.towards(origin);
+        let distance = if light.homogeneous().w == 0.0 { f32::INFINITY } else { to_light.length() };
+        self.mesh.transmitted(origin, to_light.normalize_or_zero(), distance, |triangle| {
+            let material = self.scene.material_of[self.mesh.source[triangle as usize] as usize];
+            self.scene.materials[material as usize].transmittance.map_or(Vec3::ZERO, Vec3::from_array)
+        })
     }
 }

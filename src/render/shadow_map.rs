@@ -14,9 +14,11 @@ use super::{
     depth_pass::{DepthPass, MAP_FORMAT},
     forward::{Forward, ForwardOptions},
     gpu::SHADOW_MAP,
+    light_map::LightMap,
     light_view::views,
     stage::{Begin, Part, Stage, Targets},
     technique::{Cost, Technique},
+    view_matrices::per_instance,
 };
 use glam::Mat4;
 
@@ -42,14 +44,7 @@ pub struct ShadowMap {
     layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
     forward: Forward,
-    map: Option<Map>,
-}
-
-/// The faces of a map: 1, or 6 of a point light.
-#[derive(Debug)]
-struct Map {
-    faces: Vec<wgpu::TextureView>,
-    group: wgpu::BindGroup,
+    map: Option<(LightMap, wgpu::BindGroup)>,
 }
 
 impl ShadowMap {
@@ -59,11 +54,7 @@ impl ShadowMap {
     /// A size beyond the adapter's limits.
     pub fn new(stage: &Stage, options: ShadowMapOptions) -> Result<Self, RenderError> {
         let (gpu, kernel) = (&stage.gpu, options.kernel_texels);
-        let (needed, limit) = (u64::from(options.size_texels), u64::from(gpu.limits().max_texture_dimension_2d));
-        if needed > limit {
-            return Err(RenderError::TooLarge { what: "the sides of a shadow map", needed, limit });
-        }
-        let bias = wgpu::DepthBiasState { constant: BIAS_ULPS, slope_scale: kernel as f32, clamp: 0.0 };
+        LightMap::check_side(gpu, options.size_texels)?;
         let fragment = wgpu::ShaderStages::FRAGMENT;
         let array = depth_texture(wgpu::TextureViewDimension::D2Array);
         let bindings = [(fragment, STORAGE), (fragment, array), (fragment, COMPARISON)];
@@ -81,43 +72,44 @@ impl ShadowMap {
             Forward::new(stage, &SHADOW_MAP, Some(&layout), ForwardOptions { constants, ..Default::default() });
         let count = 6 * stage.placements().len();
         let matrices = buffer::<Mat4>(gpu, "light matrices", count, wgpu::BufferUsages::STORAGE);
-        let depth_pass = DepthPass::new(stage, 6, bias);
+        let depth_pass = DepthPass::new(stage, 6, depth_bias(kernel));
         gpu.check()?;
         Ok(Self { options, depth_pass, matrices, layout, sampler, forward, map: None })
     }
 
-    fn make_map(&self, stage: &Stage, count: u32) -> Map {
-        let side = self.options.size_texels;
-        let texture = stage.gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("shadow map"),
-            size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: count },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: MAP_FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
-        let view = |first, count, dimension| {
-            texture.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(dimension),
-                base_array_layer: first,
-                array_layer_count: Some(count),
-                ..Default::default()
-            })
-        };
-        let all = view(0, count, wgpu::TextureViewDimension::D2Array);
-        let group = group(
-            &stage.gpu,
-            &self.layout,
-            &[
-                self.matrices.as_entire_binding(),
-                wgpu::BindingResource::TextureView(&all),
-                wgpu::BindingResource::Sampler(&self.sampler),
-            ],
-        );
-        Map { faces: (0..count).map(|face| view(face, 1, wgpu::TextureViewDimension::D2)).collect(), group }
+    fn make_map(&self, stage: &Stage, count: u32) -> (LightMap, wgpu::BindGroup) {
+        let map = LightMap::new(&stage.gpu, MAP_FORMAT, (self.options.size_texels, count));
+        let resources = [
+            self.matrices.as_entire_binding(),
+            wgpu::BindingResource::TextureView(&map.all),
+            wgpu::BindingResource::Sampler(&self.sampler),
+        ];
+        let group = group(&stage.gpu, &self.layout, &resources);
+        (map, group)
     }
+
+    /// Texels that the filter reaches beyond a lookup.
+    pub(super) fn reach_texels(&self) -> f32 {
+        0.5 * self.options.kernel_texels as f32
+    }
+
+    /// Draws the casters from these views: 1, or 6 of a point light.
+    pub(super) fn redraw(&mut self, stage: &Stage, views: &[Mat4], encoder: &mut wgpu::CommandEncoder) {
+        let map = match self.map.take() {
+            Some(map) if map.0.faces.len() == views.len() => map,
+            _ => self.make_map(stage, views.len() as u32),
+        };
+        for (number, (&view, face)) in views.iter().zip(&map.0.faces).enumerate() {
+            self.depth_pass.record(stage, (number, view), face, encoder);
+        }
+        self.map = Some(map);
+        stage.gpu.queue.write_buffer(&self.matrices, 0, bytemuck::cast_slice(&per_instance(stage, views)));
+    }
+}
+
+/// The rule of the module, for lookups in `kernel_texels` texels a side.
+pub(super) fn depth_bias(kernel_texels: u32) -> wgpu::DepthBiasState {
+    wgpu::DepthBiasState { constant: BIAS_ULPS, slope_scale: kernel_texels as f32, clamp: 0.0 }
 }
 
 impl Technique for ShadowMap {
@@ -135,22 +127,8 @@ impl Technique for ShadowMap {
         request: &FrameRequest,
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), RenderError> {
-        let reach = 0.5 * self.options.kernel_texels as f32;
-        let views = views(stage, &request.light, (self.options.size_texels, reach));
-        let map = match self.map.take() {
-            Some(map) if map.faces.len() == views.len() => map,
-            _ => self.make_map(stage, views.len() as u32),
-        };
-        for (number, (&view, face)) in views.iter().zip(&map.faces).enumerate() {
-            self.depth_pass.record(stage, (number, view), face, encoder);
-        }
-        self.map = Some(map);
-        let of_instance = |placement: &super::stage::Placement| {
-            let world_from_unit = placement.world_from_unit();
-            views.iter().map(move |&view| view * world_from_unit)
-        };
-        let matrices: Vec<Mat4> = stage.placements().iter().flat_map(of_instance).collect();
-        stage.gpu.queue.write_buffer(&self.matrices, 0, bytemuck::cast_slice(&matrices));
+        let views = views(stage, &request.light, (self.options.size_texels, self.reach_texels()));
+        self.redraw(stage, &views, encoder);
         Ok(())
     }
 
@@ -162,13 +140,13 @@ impl Technique for ShadowMap {
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), RenderError> {
         let mut pass = targets.begin(encoder, (request.options.mode, Begin::Clear));
-        pass.set_bind_group(2, self.map.as_ref().map(|map| &map.group), &[]);
+        pass.set_bind_group(2, self.map.as_ref().map(|(_, group)| group), &[]);
         self.forward.draw(stage, request, targets, (&mut pass, Part::All));
         Ok(())
     }
 
     fn cost(&self, stage: &Stage) -> Cost {
-        let faces = self.map.as_ref().map_or(1, |map| map.faces.len());
+        let faces = self.map.as_ref().map_or(1, |(map, _)| map.faces.len());
         Cost {
             passes: 1,
             draw_calls: stage.calls_per_pass(),

@@ -72,6 +72,22 @@ pub(crate) enum Part {
     Casters,
     /// Those of the ground.
     Ground,
+    /// Those that no light passes.
+    Opaque,
+    /// Those that some light passes.
+    Transparent,
+}
+
+impl Part {
+    fn holds(self, batch: &Batch) -> bool {
+        match self {
+            Self::All => true,
+            Self::Casters => !batch.ground,
+            Self::Ground => batch.ground,
+            Self::Opaque => !batch.transparent,
+            Self::Transparent => batch.transparent,
+        }
+    }
 }
 
 /// The bind group layouts of all techniques: group 0 is the frame, group 1 a material; group 2 is the technique's own.
@@ -139,14 +155,25 @@ impl Stage {
         &self.placements
     }
 
-    /// Draw calls of a pass over all casters.
+    /// Draw calls of a pass over everything.
     #[must_use]
     pub fn calls_per_pass(&self) -> usize {
+        self.calls_of(Part::All)
+    }
+
+    /// Draw calls of a pass over a part.
+    pub(crate) fn calls_of(&self, part: Part) -> usize {
         let calls = match self.draw_calls {
             DrawCalls::Instanced => 1,
             DrawCalls::OnePerInstance => self.placements.len(),
         };
-        calls * self.model.batches.len()
+        calls * self.model.batches.iter().filter(|batch| part.holds(batch)).count()
+    }
+
+    /// Does light pass some of the triangles?
+    #[must_use]
+    pub fn has_transparent(&self) -> bool {
+        self.model.batches.iter().any(|batch| batch.transparent)
     }
 
     /// Draw calls over some of the casters' sections.
@@ -203,18 +230,14 @@ impl Stage {
     /// Sends the frame's constants; every technique's passes read them.
     pub(super) fn send(&self, request: &FrameRequest) {
         let clip_from_world = request.camera.clip_from_world(request.options.size_px);
-        let vector = |light: Light| match light {
-            Light::Directional { to_light } => to_light.extend(0.0),
-            Light::Point { position } => position.extend(1.0),
-        };
         let frame =
-            FrameUniform { clip_from_world, light: vector(request.light), eye: request.camera.eye().extend(1.0) };
+            FrameUniform { clip_from_world, light: request.light.homogeneous(), eye: request.camera.eye().extend(1.0) };
         let instance = |placement: &Placement| {
             let world_from_unit = placement.world_from_unit();
             Instance {
                 clip_from_unit: clip_from_world * world_from_unit,
                 world_from_unit,
-                light: vector(placement.light_unit(&request.light)),
+                light: placement.light_unit(&request.light).homogeneous(),
             }
         };
         let instances: Vec<Instance> = self.placements.iter().map(instance).collect();
@@ -246,13 +269,8 @@ impl Stage {
         (part, wanted): (Part, &dyn Fn(u32) -> bool),
         pipeline: impl Fn(&Batch) -> &'p wgpu::RenderPipeline,
     ) {
-        let drawn = |batch: &&Batch| match part {
-            Part::All => true,
-            Part::Casters => !batch.ground,
-            Part::Ground => batch.ground,
-        };
         let count = self.placements.len() as u32;
-        for batch in self.model.batches.iter().filter(drawn) {
+        for batch in self.model.batches.iter().filter(|batch| part.holds(batch)) {
             let runs = batch.runs(wanted);
             if runs.is_empty() {
                 continue;

@@ -32,7 +32,15 @@ impl Turntable {
     /// # Errors
     /// Their textures exceed the adapter's limits, or the driver reports an error.
     pub fn set_planes(&mut self, set: &BakedSet) -> Result<(), RenderError> {
-        self.planes = OccluderPlanes::new(&self.stage, set)?;
+        self.set_soft_planes(set, 0.0)
+    }
+
+    /// The same with soft edges under directional lights of an angular radius.
+    ///
+    /// # Errors
+    /// As of [`Turntable::set_planes`].
+    pub fn set_soft_planes(&mut self, set: &BakedSet, light_radius_rad: f32) -> Result<(), RenderError> {
+        self.planes = OccluderPlanes::soft(&self.stage, set, light_radius_rad)?;
         Ok(())
     }
 

@@ -21,9 +21,11 @@ use wgpu::util::{DeviceExt, TextureDataOrder};
 
 /// What a draw has in common: cull mode and textures. The order of the draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Look {
+pub struct Look {
     ground: bool,
-    double_sided: bool,
+    transparent: bool,
+    /// Both sides are drawn.
+    pub double_sided: bool,
     has_holes: bool,
     image: Option<usize>,
     repeat: [bool; 2],
@@ -37,6 +39,8 @@ const EXTREME_DIRECTIONS: usize = 512;
 pub struct Batch {
     /// Of the ground: receives and does not cast.
     pub ground: bool,
+    /// Light passes it ([`Material::transmittance`](crate::scene::Material)).
+    pub transparent: bool,
     /// Both sides are drawn.
     pub double_sided: bool,
     /// Its image cuts holes.
@@ -71,6 +75,8 @@ pub struct Model {
     /// The corners of the casters that lie farthest in some of [`EXTREME_DIRECTIONS`] directions, unit space: what a
     /// light's view must hold.
     pub extremes: Vec<Vec3>,
+    /// The box of all triangles, the ground's too, unit space: least and greatest corner.
+    pub bounds: [Vec3; 2],
 }
 
 impl Model {
@@ -84,6 +90,7 @@ impl Model {
     ) -> Result<Self, RenderError> {
         let (vertices, looks) = vertices(scene, frame);
         let extremes = extremes(&vertices, &looks);
+        let bounds = vertices.iter().fold([Vec3::MAX, Vec3::MIN], |[low, high], v| [low.min(v.p), high.max(v.p)]);
         let bytes: &[u8] = bytemuck::cast_slice(&vertices);
         let limit = gpu.limits().max_buffer_size;
         if bytes.len() as u64 > limit {
@@ -105,14 +112,15 @@ impl Model {
                 }
             };
             let bind_group = bind(gpu, material, &materials, view, look.repeat);
-            let Look { ground, double_sided, has_holes, .. } = look;
-            batches.push(Batch { ground, double_sided, has_holes, bind_group, sections });
+            let Look { ground, transparent, double_sided, has_holes, .. } = look;
+            batches.push(Batch { ground, transparent, double_sided, has_holes, bind_group, sections });
         }
-        Ok(Self { vertices, batches, extremes })
+        Ok(Self { vertices, batches, extremes, bounds })
     }
 }
 
-fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Vec<(u32, Range<u32>)>)>) {
+/// The vertices in the order of [`Model::vertices`], three a triangle, in the unit space of `frame`, and what they draw.
+pub fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Vec<(u32, Range<u32>)>)>) {
     let mut triangles_of: BTreeMap<Look, Vec<usize>> = BTreeMap::new();
     for (triangle, &material) in scene.material_of.iter().enumerate() {
         let material = &scene.materials[material as usize];
@@ -123,6 +131,7 @@ fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Vec<(u32, 
         triangles_of
             .entry(Look {
                 ground,
+                transparent: material.transmittance.is_some(),
                 double_sided,
                 has_holes: material.alpha_cutoff.is_some(),
                 image: material.image,

@@ -17,7 +17,13 @@ impl Scene {
         let corner =
             |x: f64, z: f64| DVec3::new(frame.centre_model.x + x * reach, height, frame.centre_model.z + z * reach);
         let [a, b, c, d] = [corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
-        self.materials.push(Material { base_color: COLOR, image: None, repeat: [false; 2], alpha_cutoff: None });
+        self.materials.push(Material {
+            base_color: COLOR,
+            image: None,
+            repeat: [false; 2],
+            alpha_cutoff: None,
+            transmittance: None,
+        });
         for triangle in [[a, b, c], [a, c, d]] {
             self.soup.corners_model.push(triangle);
             self.soup.sides.push(Sides::Front);

@@ -10,7 +10,10 @@ use super::{
     accessor::Data,
     document::{self, Listed, TextureInfo, TextureTransform, record},
 };
-use crate::gltf_file::{GltfFile, UriError};
+use crate::{
+    gltf_file::{GltfFile, UriError},
+    render::linear_from_srgb,
+};
 use glam::{DAffine2, DVec2};
 use gltf::json::{material::AlphaMode, texture::WrappingMode};
 use image::{ImageFormat, ImageReader, Limits, RgbaImage};
@@ -125,6 +128,13 @@ impl<'a> Surfaces<'a> {
                     notices.add("base colour textures", 1, &why);
                 }
             }
+        }
+        if mode == AlphaMode::Blend {
+            let material = &self.materials[slot];
+            let image = material.image.map(|image| &*self.images[image]);
+            // Exporters write BLEND for surfaces without any transparency too.
+            let transmittance = transmittance(material.base_color, image);
+            self.materials[slot].transmittance = (transmittance != [0.0; 3]).then_some(transmittance);
         }
         let sides = if record.double_sided { Sides::Both } else { Sides::Front };
         let mut surface = Surface { material: slot as u32, sides, cutout: None, is_visible: true, uv };
@@ -265,7 +275,24 @@ fn plain(record: &document::Material) -> Material {
         image: None,
         repeat: [true; 2],
         alpha_cutoff: is_mask.then(|| record.alpha_cutoff.unwrap_or(0.5) as f32),
+        transmittance: None,
     }
+}
+
+/// `Material::transmittance` of a factor and an image.
+fn transmittance(factor: [f32; 4], image: Option<&RgbaImage>) -> [f32; 3] {
+    let linear: Vec<f32> = (0..=255).map(linear_from_srgb).collect();
+    let of_texel = |texel: &image::Rgba<u8>| {
+        let a = factor[3] * f32::from(texel.0[3]) / 255.0;
+        [0, 1, 2].map(|k| {
+            let c = factor[k] * linear[usize::from(texel.0[k])];
+            f64::from((1.0 - a) * (1.0 - a * (1.0 - c)))
+        })
+    };
+    let white = RgbaImage::from_pixel(1, 1, image::Rgba([255; 4]));
+    let image = image.unwrap_or(&white);
+    let sum = image.pixels().map(of_texel).fold([0.0; 3], |sum, t| [0, 1, 2].map(|k| sum[k] + t[k]));
+    sum.map(|sum| (sum / (f64::from(image.width()) * f64::from(image.height()))) as f32)
 }
 
 fn image_format(name: &str) -> Fault {

@@ -2,7 +2,8 @@
 //!
 //! A primitive says `"extensions": {"SHADOWFIT_node_shadow_planes": {"section": i}}`, or has the vertex attribute
 //! `_SHADOW_SECTION` where it holds several sections. Without a label it belongs to section 0 where there is one
-//! section, and to none where there are several. Labels in a file without shadow planes mean nothing.
+//! section, and to none where there are several. Where the planes serve a ground, the last section is the ground's and no
+//! primitive's. Labels in a file without shadow planes mean nothing.
 
 use super::{
     Fault,
@@ -15,7 +16,10 @@ use serde_json::Value;
 
 /// The sections that a file has.
 pub(super) struct Sections {
+    /// Those that primitives may belong to.
     count: u32,
+    /// What stands for none of them.
+    none: u32,
 }
 
 /// The sections of a primitive's triangles.
@@ -39,8 +43,11 @@ impl Sections {
         let labels = |node: &Value| node.get("extensions")?.get(EXTENSION)?.get("set")?.as_u64();
         let nodes = root.get("nodes").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
         let set = nodes.iter().find_map(labels).unwrap_or(0);
-        let sections = root.pointer(&format!("/extensions/{EXTENSION}/sets/{set}/sections")).and_then(Value::as_array);
-        Self { count: sections.map_or(0, Vec::len).min(u32::MAX as usize) as u32 }
+        let set = root.pointer(&format!("/extensions/{EXTENSION}/sets/{set}"));
+        let sections = set.and_then(|set| set.get("sections")).and_then(Value::as_array);
+        let none = sections.map_or(0, Vec::len).min(u32::MAX as usize) as u32;
+        let ground = u32::from(set.is_some_and(|set| set.get("ground").is_some()));
+        Self { count: none.saturating_sub(ground), none }
     }
 
     /// The label of the primitive at `pointer`, which has so many vertices.
@@ -65,7 +72,7 @@ impl Sections {
                 None => Err(Fault::new(pointer, format!("{section}, but there are {} sections", self.count))),
             };
         }
-        let Some(index) = record.attributes.get(SECTION_ATTRIBUTE) else { return Ok(Label::Whole(self.count)) };
+        let Some(index) = record.attributes.get(SECTION_ATTRIBUTE) else { return Ok(Label::Whole(self.none)) };
         let user = format!("{pointer}/attributes/{SECTION_ATTRIBUTE}");
         let accessor = data.accessor(*index, &user, Type::Scalar, Use::Number)?;
         if accessor.count < vertices {

@@ -54,6 +54,8 @@ fn usage_errors_end_with_1() {
         ["render", &asset, "-o", "a.png", "--view", "0,91"].map(str::to_owned).to_vec(),
         ["render", &asset, "-o", "a.png", "--size", "0"].map(str::to_owned).to_vec(),
         ["render", &asset, "-o", "a.png", "--mode", "pretty"].map(str::to_owned).to_vec(),
+        ["render", &asset, "-o", "a.png", "--light-radius", "46"].map(str::to_owned).to_vec(),
+        ["render", &asset, "-o", "a.png", "--light-radius", "nan"].map(str::to_owned).to_vec(),
     ];
     for words in &cases {
         let outcome = run(words);

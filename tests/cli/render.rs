@@ -78,6 +78,20 @@ fn light_and_view_move_what_is_seen() {
 }
 
 #[test]
+fn a_light_with_a_radius_has_soft_edges() {
+    let folder = tempfile::tempdir().unwrap();
+    let asset = small_asset(folder.path());
+    let words = ["--mode", "mask", "--light", "-30,60", "--view", "20,35"];
+    let grey = |radius: &str| {
+        let mask = picture(&asset, &[&words[..], &["--light-radius", radius]].concat());
+        mask.pixels().filter(|pixel| pixel.0[1] == 255 && (1..255).contains(&pixel.0[0])).count()
+    };
+    // The outline of the shadow is some 40 pixels long, its penumbra 2 pixels wide at 4 degrees.
+    let [none, narrow, wide] = ["0", "4", "12"].map(grey);
+    assert!(none == 0 && narrow > 20 && wide > narrow * 3 / 2, "{none} {narrow} {wide}");
+}
+
+#[test]
 fn light_in_the_plane_or_below_the_horizon_draws_no_nonsense() {
     let folder = tempfile::tempdir().unwrap();
     let asset = small_asset(folder.path());

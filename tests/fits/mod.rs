@@ -3,7 +3,7 @@
 pub use shadowfit::pipeline::FitRequest;
 use shadowfit::{
     asset::{ShadowSet, read},
-    effort::{Effort, Plan},
+    effort::{Effort, GroundPlan, Plan},
     pipeline::{FitError, run},
     report::Report,
 };
@@ -27,6 +27,7 @@ pub fn request(model: &Path, out_dir: &Path, effort: Effort) -> FitRequest {
         max_lookups: None,
         sections: None,
         texture_budget: None,
+        ground: false,
         max_error: None,
         texture_size: None,
         domain: LightDomain::Sphere,
@@ -62,6 +63,10 @@ pub fn least() -> Effort {
             trace: TraceOptions { pairs: 1_200_000, ..trace },
             directions: 48,
             search: SearchOptions { max_planes: 6, ..search },
+            ground: GroundPlan {
+                pairs: 300_000,
+                search: Some(SearchOptions { max_planes: 12, replace_rounds: 0, ..search }),
+            },
             ..divided
         },
     }
@@ -81,7 +86,7 @@ pub fn fit(request: &FitRequest) -> Result<(Report, ShadowSet), FitError> {
 
 /// JSON has no NaN: serde writes `null` in its place, which only these members may be.
 fn assert_finite(report: &serde_json::Value, set: &ShadowSet) {
-    const MAY_BE_NULL: [&str; 4] = ["image", "certificate", "peak_memory_bytes", "max_error"];
+    const MAY_BE_NULL: [&str; 5] = ["image", "certificate", "ground", "peak_memory_bytes", "max_error"];
     let mut open = vec![(String::new(), report)];
     while let Some((name, value)) = open.pop() {
         match value {

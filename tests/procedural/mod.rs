@@ -104,7 +104,7 @@ impl Random {
 }
 
 fn material(base_color: [f32; 4], image: Option<usize>, alpha_cutoff: Option<f32>) -> Material {
-    Material { base_color, image, repeat: [true; 2], alpha_cutoff }
+    Material { base_color, image, repeat: [true; 2], alpha_cutoff, transmittance: None }
 }
 
 fn checkers() -> image::RgbaImage {

@@ -103,6 +103,20 @@ fn blend_is_opaque_and_counted() {
     let scene = textured(json!({"alphaMode": "BLEND"})).scene();
     assert_eq!(skipped(&scene, "blended materials"), 1);
     assert_eq!((scene.soup.cutout[0], scene.materials[1].alpha_cutoff), (None, None));
+    // What passes: nothing through the opaque red texel; half through the green one, green tinted.
+    let a = 128.0 / 255.0;
+    let expected = [0.5 * (1.0 - a) * (1.0 - a), 0.5 * (1.0 - a), 0.5 * (1.0 - a) * (1.0 - a)];
+    let passes = scene.materials[1].transmittance.unwrap();
+    assert!(passes.iter().zip(expected).all(|(t, e)| (t - e).abs() < 1e-6), "{passes:?} {expected:?}");
+    // Without an image the factor says all, and alpha 1 lets nothing pass.
+    for (factor, expected) in [([1.0, 0.5, 0.0, 0.5], Some([0.5, 0.375, 0.25])), ([1.0; 4], None)] {
+        let mut model = Model::triangle();
+        let factor = json!({"baseColorFactor": factor});
+        model.push("materials", json!({"alphaMode": "BLEND", "pbrMetallicRoughness": factor}));
+        model.primitive()["material"] = json!(0);
+        assert_eq!(model.scene().materials[1].transmittance, expected);
+    }
+    assert_eq!(textured(json!({})).scene().materials[1].transmittance, None);
 }
 
 /// Name, change of the file, exit code where the material is a cut-out.

@@ -1,5 +1,6 @@
 //! Closed-form scenes on a stage, drawn by a technique and traced, and the errors between.
 
+use crate::pictures;
 use glam::{DVec3, Vec2, Vec3};
 use shadowfit::{
     masks::MaskErrors,
@@ -7,12 +8,13 @@ use shadowfit::{
         Antialias, Camera, FrameOptions, FrameRequest, Light, Mode,
         gpu::Gpu,
         ray_traced::RayTraced,
+        receiver::Receiver,
         stage::{Placement, Stage},
         technique::Technique,
     },
     scene::{Material, Scene},
 };
-use shadowfit_solver::mesh::{Frame, Sides};
+use shadowfit_solver::mesh::{Frame, Mesh, Sides};
 use std::sync::LazyLock;
 
 pub const SIZE_PX: [u32; 2] = [256, 256];
@@ -30,12 +32,35 @@ pub fn gpu() -> &'static Gpu {
 pub struct Case {
     pub stage: Stage,
     pub traced: RayTraced,
+    /// Where world space lies in model space.
+    pub world: Frame,
 }
 
 impl Case {
     pub fn new(scene: Scene) -> Self {
-        let stage = Stage::new(gpu(), &scene, &WORLD, &[Placement::IDENTITY]).expect("the scene fits");
-        Self { stage, traced: RayTraced::new(scene, &WORLD).expect("a model") }
+        Self::in_world(scene, WORLD)
+    }
+
+    /// A committed model; world space is its unit space.
+    pub fn of_model(model: &str) -> Self {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("models").join(model);
+        let scene = shadowfit::scene::load(&path).expect("a model");
+        let world = Mesh::new(&scene.soup).expect("triangles").frame;
+        Self::in_world(scene, world)
+    }
+
+    /// A committed model on a ground of half extent 2; world space is the model's unit space.
+    pub fn on_ground(model: &str) -> Self {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("models").join(model);
+        let mut scene = shadowfit::scene::load(&path).expect("a model");
+        let world = Mesh::new(&scene.soup).expect("triangles").frame;
+        scene.stand_on_ground(&world, 2.0);
+        Self::in_world(scene, world)
+    }
+
+    fn in_world(scene: Scene, world: Frame) -> Self {
+        let stage = Stage::new(gpu(), &scene, &world, &[Placement::IDENTITY]).expect("the scene fits");
+        Self { stage, traced: RayTraced::new(scene, &world).expect("a model"), world }
     }
 
     /// The traced mask and the drawn one.
@@ -43,6 +68,16 @@ impl Case {
         let view = self.traced.look(request).expect("traced");
         let traced = self.traced.picture(&view).expect("traced");
         [traced, self.stage.render(technique, request).expect("drawn")]
+    }
+
+    /// For each pixel: does the camera see the ground?
+    pub fn ground_seen(&self, request: &FrameRequest) -> Vec<bool> {
+        self.traced.ground_seen(&self.traced.look(request).expect("traced"))
+    }
+
+    /// The flat receiver that the ground is.
+    pub fn receiver(&self) -> Receiver {
+        Receiver::of_ground(self.traced.scene(), &self.world).expect("a ground")
     }
 
     /// Missed and false shadow, shares of the covered pixels. Keeps both masks for people.
@@ -54,6 +89,29 @@ impl Case {
         assert!(errors.covered > 1000.0, "the camera sees next to nothing");
         [errors.share(errors.missed), errors.share(errors.false_)]
     }
+}
+
+/// Missed and false shadow, shares of the covered pixels of the ground.
+pub fn ground_errors([traced, drawn]: &[image::RgbaImage; 2], ground: &[bool]) -> [f64; 2] {
+    let errors = MaskErrors::where_seen(traced, drawn, |pixel| ground[pixel]);
+    assert!(errors.covered > 1000.0, "the camera sees next to no ground");
+    [errors.share(errors.missed), errors.share(errors.false_)]
+}
+
+/// Pixels of the ground that are wrong though no pixel around them differs from them in the traced mask: wrong not just
+/// because a border runs through them.
+pub fn wrong_off_borders([traced, drawn]: &[image::RgbaImage; 2], ground: &[bool]) -> usize {
+    let [width, height] = [traced.width(), traced.height()];
+    let around = |x: u32, y: u32| {
+        (y.saturating_sub(1)..(y + 2).min(height))
+            .flat_map(move |j| (x.saturating_sub(1)..(x + 2).min(width)).map(move |i| (i, j)))
+    };
+    let is_wrong = |&(x, y): &(u32, u32)| {
+        let here = traced.get_pixel(x, y);
+        here != drawn.get_pixel(x, y) && around(x, y).all(|(i, j)| traced.get_pixel(i, j) == here)
+    };
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    pixels.filter(|&(x, y)| ground[(y * width + x) as usize]).filter(is_wrong).count()
 }
 
 /// A mask from `eye`, looking at `target`.
@@ -71,6 +129,16 @@ pub fn directional(x: f32, y: f32, z: f32) -> Light {
     Light::Directional { to_light: Vec3::new(x, y, z).normalize() }
 }
 
+/// The golden picture of a technique: its mask of a scene, in tests/golden/techniques. `none` alone may lack shadow.
+pub fn golden(case: &mut Case, technique: &mut dyn Technique, request: &FrameRequest) {
+    let options = FrameOptions { size_px: pictures::SIZE_PX, ..request.options };
+    let frame = case.stage.render(technique, &FrameRequest { options, ..*request }).expect("drawn");
+    let words: Vec<String> = technique.name().split_whitespace().map(|word| word.replace(',', "")).collect();
+    assert!(words == ["none"] || !pictures::shows_too_little_shadow(&frame), "choose another view or light");
+    pictures::check(&format!("techniques/{}", words.join("-")), &frame)
+        .unwrap_or_else(|difference| panic!("{difference}"));
+}
+
 /// Writes a picture that a person may look at to `target/tmp/techniques/`.
 pub fn keep(picture: &image::RgbaImage, name: &str) {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("techniques");
@@ -80,7 +148,8 @@ pub fn keep(picture: &image::RgbaImage, name: &str) {
 
 /// An empty scene with one white material.
 pub fn empty() -> Scene {
-    let white = Material { base_color: [1.0; 4], image: None, repeat: [false; 2], alpha_cutoff: None };
+    let white =
+        Material { base_color: [1.0; 4], image: None, repeat: [false; 2], alpha_cutoff: None, transmittance: None };
     Scene { materials: vec![white], ..Scene::default() }
 }
 
@@ -116,6 +185,23 @@ pub fn push(scene: &mut Scene, corners: [Vec3; 3]) {
     scene.material_of.push(0);
     scene.section_of.push(0);
     scene.origins.push(shadowfit::scene::Origin { mesh: 0, primitive: 0, triangle: scene.origins.len() as u32 });
+}
+
+/// Adds a level ground from `low` to `high` (x, z) at height 0, behind all else: it receives and does not cast.
+pub fn ground(scene: &mut Scene, low: Vec2, high: Vec2) {
+    let corner = Vec3::new(low.x, 0.0, high.y);
+    quad(scene, corner, Vec3::X * (high.x - low.x), Vec3::NEG_Z * (high.y - low.y));
+    scene.ground_triangles = 2;
+}
+
+/// Level plates (centre, half side) over a ground of side 3.
+pub fn plates_over_ground(plates: &[(Vec3, f32)]) -> Scene {
+    let mut scene = empty();
+    for &(centre, half) in plates {
+        quad(&mut scene, centre + Vec3::new(-half, 0.0, half), Vec3::X * 2.0 * half, Vec3::NEG_Z * 2.0 * half);
+    }
+    ground(&mut scene, Vec2::splat(-1.5), Vec2::splat(1.5));
+    scene
 }
 
 /// A square plate of side 0.8 at height 0.5 over a ground of side 3 at height 0.
