@@ -4,7 +4,8 @@
 //! with the glTF extension [`EXTENSION`]), `STEM.shadow.json` (the same set of planes with `uri`s in the place of
 //! texture indices) and `STEM.atlas-0.png`, ... [`read()`] takes any of these, checks it, and gives the set back.
 //! Where there are several sections, the primitives of the GLB say which they belong to (`labels`); the scene's reader
-//! gives that back. [`read_plane_file`] reads rectangles that a person placed.
+//! gives that back. A [`ModelGround`] below the model has the last section, which no primitive belongs to.
+//! [`read_plane_file`] reads rectangles that a person placed.
 //!
 //! Numbers in the files are in model space, metres, f64 in the shortest spelling that stands for them; the solver's are
 //! in unit space and f32. No planes is legal and means "no self-shadow": the set is there, without textures.

@@ -10,13 +10,16 @@
 mod bench;
 mod catalogue;
 mod chart;
+mod crowd;
 mod errors;
 mod scaling;
 mod speed;
 mod table;
 
 pub use catalogue::Family;
-pub use table::{Comparison, Row, SCHEMA, Scaling};
+pub use crowd::CrowdRow;
+pub use scaling::ScalingRow;
+pub use table::{Comparison, Row, SCHEMA};
 
 use crate::{
     asset::files,
@@ -51,11 +54,12 @@ pub fn run(
     progress: &mut dyn FnMut(String),
 ) -> Result<Comparison, FitError> {
     let mut bench = Bench::new(request, options, progress)?;
-    let mut settings = catalogue::settings(&mut bench, options)?;
+    let mut settings = catalogue::settings(&bench, options)?;
     let (errors, pictures) = errors::measure(&mut bench, &mut settings, options, progress)?;
     let times = speed::measure(&mut bench, &mut settings, options, progress)?;
     let scaling = scaling::measure(&bench, options, progress)?;
-    let comparison = Comparison::new((request, options), &bench, (&settings, &errors, &times), scaling);
+    let crowd = crowd::measure(&bench, options, progress)?;
+    let comparison = Comparison::new((request, options), &bench, (&settings, &errors, &times), (scaling, crowd));
     write(request, &comparison, &pictures)?;
     Ok(comparison)
 }

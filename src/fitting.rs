@@ -1,7 +1,8 @@
 //! The fit itself: from a mesh to a set of baked planes, one line a stage.
 //!
 //! One section where a few planes explain all shadow, or where the user names a number of planes; else as many as the
-//! preset has, each with short lists.
+//! preset has, each with short lists. A ground is one more section; where planes are few they serve both, the pairs of
+//! model and ground being searched in one table.
 
 use crate::{
     asset::{self, AssetError},

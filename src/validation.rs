@@ -83,7 +83,7 @@ const ELEVATIONS_DEG: [f32; 4] = [25.0, -15.0, 50.0, 5.0];
 /// The renderer under test.
 enum Renderer<'a> {
     Gpu(Box<turntable::Turntable>, String),
-    Cpu(cpu::Turntable<'a>),
+    Cpu(Box<cpu::Turntable<'a>>),
 }
 
 impl<'a> Renderer<'a> {
@@ -99,7 +99,7 @@ impl<'a> Renderer<'a> {
             Err(RenderError::NoAdapter | RenderError::Device { .. } | RenderError::TooLarge { .. }) => {
                 let mut turntable = cpu::Turntable::new(scene, mesh);
                 turntable.set_planes(set);
-                Ok(Self::Cpu(turntable))
+                Ok(Self::Cpu(Box::new(turntable)))
             }
             outcome => outcome,
         }

@@ -3,7 +3,7 @@
 use super::{
     CompareOptions,
     bench::{Bench, World},
-    catalogue::{Against, Setting, draw},
+    catalogue::{Against, Setting},
 };
 use crate::{
     masks::{MaskErrors, difference, mean_flip, side_by_side},
@@ -70,16 +70,16 @@ pub(super) fn measure(
     let mut sums = vec![Sums::default(); settings.len()];
     let mut pictures = Vec::new();
     for view in 0..options.views {
-        for world in [World::Model, World::Ground] {
+        for world in [World::Model, World::Ground, World::Glass] {
+            if !settings.iter().any(|setting| setting.world.bare() == world) {
+                continue;
+            }
             let seen = bench.traced(world).look(&bench.request(world, (view, 0), Mode::Mask))?;
             let shown = if view == 0 { Some(light_to_show(bench, world, &seen, options.lights)?) } else { None };
             for light in 0..options.lights {
                 progress(format!("errors: view {} of {}, light {}", view + 1, options.views, light + 1));
-                for against in [Against::Hard, Against::Soft] {
-                    let same = |setting: &Setting| {
-                        let is_ground = setting.world == World::Ground;
-                        is_ground == (world == World::Ground) && setting.against == against
-                    };
+                for against in [Against::Hard, Against::Soft, Against::Transmitted] {
+                    let same = |setting: &Setting| setting.world.bare() == world && setting.against == against;
                     if !settings.iter().any(same) {
                         continue;
                     }
@@ -122,13 +122,11 @@ fn reference(
             (Against::Soft, Light::Directional { to_light }) => {
                 traced.soft_picture(&view, &AreaLight::distant(to_light, SOFT_HALF_ANGLE_RAD), SOFT_SAMPLES)
             }
+            (Against::Transmitted, _) => traced.transmitted_picture(&view),
             _ => traced.picture(&view),
         }
     };
-    let counts = match world {
-        World::Ground => traced.ground_seen(seen),
-        World::Model | World::Planes(_) => vec![true; seen.pixels()],
-    };
+    let counts = if world.counts_ground() { traced.ground_seen(seen) } else { vec![true; seen.pixels()] };
     Ok(Reference { mask: picture(Mode::Mask)?, shaded: picture(Mode::Shaded)?, counts })
 }
 
@@ -151,9 +149,9 @@ fn compare(
     sums: &mut Sums,
     (reference, view, light): (&Reference, usize, usize),
 ) -> Result<Option<Picture>, RenderError> {
-    let world = setting.world;
-    let request = |bench: &Bench, mode| bench.request(world, (view, light), mode);
-    let mask = draw(bench, setting, &request(bench, Mode::Mask))?;
+    let requests = [Mode::Mask, Mode::Shaded].map(|mode| bench.request(setting.world, (view, light), mode));
+    let Some(stage) = bench.stage_mut(setting.world) else { return Ok(None) };
+    let mask = stage.render(&mut *setting.technique, &requests[0])?;
     let errors = MaskErrors::where_seen(&reference.mask, &mask, |pixel| reference.counts[pixel]);
     sums.masks = sums.masks.plus(errors);
     sums.frames += 1;
@@ -161,7 +159,7 @@ fn compare(
     if view > 0 {
         return Ok(None);
     }
-    let shaded = draw(bench, setting, &request(bench, Mode::Shaded))?;
+    let shaded = stage.render(&mut *setting.technique, &requests[1])?;
     sums.flips.extend(mean_flip(&reference.shaded, &shaded));
     let pictures = [&reference.shaded, &shaded, &difference(&reference.mask, &mask)];
     Ok(Some(Picture { name: slug(&setting.name()), picture: side_by_side(&pictures) }))

@@ -4,11 +4,15 @@
 //! moves before every frame. Three tests tell what binds: vertices (instances a hundredth as large, next to no
 //! fragments), fragments (ten times as large, seen from straight above), and the CPU (a draw call for each instance).
 
-use super::{CompareOptions, bench::Bench, catalogue};
+use super::{
+    CompareOptions,
+    bench::{Bench, Planes, World},
+    catalogue::{Family, Subject},
+};
 use crate::{
     pipeline::FitError,
     render::{
-        Antialias, Camera, FrameOptions, FrameRequest, Light, Mode,
+        Antialias, Camera, FrameOptions, FrameRequest, Light, Mode, RenderError,
         field::field,
         occluder_planes::OccluderPlanes,
         stage::{DrawCalls, Placement, Stage},
@@ -20,7 +24,7 @@ use glam::Vec3;
 use serde::Serialize;
 
 /// Seed of the instances.
-const FIELD_SEED: u64 = 1;
+pub(super) const FIELD_SEED: u64 = 1;
 
 /// Most instances where fragments bind: each of them covers the whole frame.
 const FILL_INSTANCES: usize = 10;
@@ -94,25 +98,43 @@ fn arrange((bound, instances): (Bound, usize)) -> (Vec<Placement>, Camera) {
     }
 }
 
+/// A technique of the scaling tests, and the number of its stage.
+pub(super) struct Scaled {
+    pub stage: usize,
+    pub name: String,
+    pub technique: Box<dyn Technique>,
+}
+
 /// The techniques that scale: those of the model's world, one setting each, and every set of planes.
-fn techniques(
+pub(super) fn techniques(
     bench: &Bench,
     stages: &[Stage],
     options: &CompareOptions,
-) -> Result<Vec<(usize, String, Box<dyn Technique>)>, FitError> {
-    let mut out: Vec<(usize, String, Box<dyn Technique>)> = Vec::new();
+) -> Result<Vec<Scaled>, RenderError> {
+    let traced = bench.traced(World::Model);
+    let subject = Subject { stage: &stages[0], scene: traced.scene(), mesh: traced.mesh(), frame: &bench.frame };
+    let mut out = Vec::new();
     for &family in &options.families {
-        if family == catalogue::Family::Planes {
-            for (set, planes) in bench.planes.iter().enumerate() {
+        if family == Family::Planes {
+            let scaled = |(set, _): &(usize, &Planes)| bench.stage(World::Planes(*set)).is_some();
+            for (set, planes) in bench.planes.iter().enumerate().filter(scaled) {
                 let technique: Box<dyn Technique> = Box::new(OccluderPlanes::new(&stages[1 + set], &planes.set)?);
-                out.push((1 + set, format!("{}, {}", technique.name(), planes.label), technique));
+                let name = format!("{}, {}", technique.name(), planes.label);
+                out.push(Scaled { stage: 1 + set, name, technique });
             }
         }
-        if let Some(technique) = catalogue::representative(family, (&stages[0], &bench.model))? {
-            out.push((0, technique.name(), technique));
+        if let Some(technique) = subject.representative(family)? {
+            out.push(Scaled { stage: 0, name: technique.name(), technique });
         }
     }
     Ok(out)
+}
+
+/// The model and the model with the sections of each set of planes, as instances.
+pub(super) fn stages(bench: &Bench, placements: &[Placement]) -> Result<Vec<Stage>, RenderError> {
+    let scenes =
+        std::iter::once(bench.traced(World::Model).scene()).chain(bench.planes.iter().map(|planes| &planes.scene));
+    scenes.map(|scene| Stage::new(&bench.gpu, scene, &bench.frame, placements)).collect()
 }
 
 fn test(
@@ -122,17 +144,15 @@ fn test(
     progress: &mut dyn FnMut(String),
 ) -> Result<(Vec<ScalingRow>, f64), FitError> {
     let (placements, camera) = arrange((bound, instances));
-    let scenes = std::iter::once(bench.model.scene()).chain(bench.planes.iter().map(|planes| &planes.scene));
-    let stage = |scene| Stage::new(&bench.gpu, scene, &bench.frame, &placements);
-    let mut stages = scenes.map(stage).collect::<Result<Vec<_>, _>>()?;
+    let mut stages = stages(bench, &placements)?;
     let draw_calls = if bound == Bound::DrawCalls { DrawCalls::OnePerInstance } else { DrawCalls::Instanced };
     stages.iter_mut().for_each(|stage| stage.draw_calls = draw_calls);
-    let timer = Timer::new(&stages[0]);
+    let timer = Timer::new(&bench.gpu);
     let mut techniques = techniques(bench, &stages, options)?;
     let mut samples = vec![(Vec::new(), Vec::new()); techniques.len()];
     for frame in 0..super::speed::WARM_UP + options.frames {
         progress(format!("{instances} instances, {bound:?}: frame {} of {}", frame + 1, options.frames));
-        for ((stage, _, technique), (frames, cpu)) in techniques.iter_mut().zip(&mut samples) {
+        for (Scaled { stage, technique, .. }, (frames, cpu)) in techniques.iter_mut().zip(&mut samples) {
             let request = FrameRequest {
                 camera,
                 light: Light::Directional { to_light: bench.light(frame) },
@@ -147,8 +167,8 @@ fn test(
     }
     let medians: Vec<[f64; 2]> = samples.into_iter().map(|(frames, cpu)| [median(frames), median(cpu)]).collect();
     let floor = medians.first().map_or(f64::MIN_POSITIVE, |none| none[0].max(f64::MIN_POSITIVE));
-    let row = |((_, technique, _), [frame, cpu]): (_, [f64; 2])| ScalingRow {
-        technique,
+    let row = |(Scaled { name, .. }, [frame, cpu]): (Scaled, [f64; 2])| ScalingRow {
+        technique: name,
         bound,
         instances,
         frame: frame / floor,

@@ -1,6 +1,10 @@
 //! How long each technique's frames take, against a frame without shadows.
 
-use super::{CompareOptions, bench::Bench, catalogue::Setting};
+use super::{
+    CompareOptions,
+    bench::{Bench, World},
+    catalogue::Setting,
+};
 use crate::{
     pipeline::FitError,
     render::{
@@ -10,6 +14,7 @@ use crate::{
     },
 };
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Frames of each technique that are drawn before any counts: shaders are compiled and caches filled.
 pub const WARM_UP: usize = 2;
@@ -40,23 +45,25 @@ pub(super) fn measure(
     options: &CompareOptions,
     progress: &mut dyn FnMut(String),
 ) -> Result<Vec<Times>, FitError> {
-    let timer = Timer::new(&bench.stages[0]);
-    let mut none: Vec<Unshadowed> = bench.stages.iter().map(Unshadowed::new).collect();
-    let mut floors = vec![Vec::new(); none.len()];
+    let bare = bench.worlds().into_iter().filter(|world| world.bare() == *world);
+    let mut none: BTreeMap<World, Unshadowed> =
+        bare.filter_map(|world| Some((world, Unshadowed::new(bench.stage(world)?)))).collect();
+    let timer = Timer::new(&bench.gpu);
+    let mut floors: BTreeMap<World, Vec<f64>> = BTreeMap::new();
     let mut samples = vec![Samples::default(); settings.len()];
     for frame in 0..WARM_UP + options.frames {
         progress(format!("times: frame {} of {}", frame + 1, WARM_UP + options.frames));
-        for (stage, none) in none.iter_mut().enumerate() {
-            let world = super::bench::World::of_stage(stage);
+        for (&world, none) in &mut none {
             let request = bench.request(world, (0, frame), Mode::Shaded);
-            let time = timer.frame((&mut bench.stages[stage], none), &request, Change::Nothing)?;
+            let Some(stage) = bench.stage_mut(world) else { continue };
+            let time = timer.frame((stage, none), &request, Change::Nothing)?;
             if frame >= WARM_UP {
-                floors[stage].push(time.frame_s);
+                floors.entry(world).or_default().push(time.frame_s);
             }
         }
         for (setting, samples) in settings.iter_mut().zip(&mut samples) {
             let request = bench.request(setting.world, (0, frame), Mode::Shaded);
-            let stage = &mut bench.stages[setting.world.stage()];
+            let Some(stage) = bench.stage_mut(setting.world) else { continue };
             let moving = timer.frame((stage, &mut *setting.technique), &request, Change::Light)?;
             let still = timer.frame((stage, &mut *setting.technique), &request, Change::Nothing)?;
             if frame >= WARM_UP {
@@ -66,9 +73,9 @@ pub(super) fn measure(
             }
         }
     }
-    let floors: Vec<f64> = floors.into_iter().map(median).collect();
+    let floors: BTreeMap<World, f64> = floors.into_iter().map(|(world, times)| (world, median(times))).collect();
     let times = |(setting, Samples { still, moving, cpu }): (&Setting, Samples)| {
-        let floor = floors[setting.world.stage()].max(f64::MIN_POSITIVE);
+        let floor = floors.get(&setting.world.bare()).map_or(f64::MIN_POSITIVE, |floor| floor.max(f64::MIN_POSITIVE));
         Times { still: median(still) / floor, moving: median(moving) / floor, cpu: median(cpu) / floor }
     };
     Ok(settings.iter().zip(samples).map(times).collect())

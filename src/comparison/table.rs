@@ -4,6 +4,7 @@ use super::{
     CompareOptions,
     bench::{Bench, World},
     catalogue::{Against, Family, Setting},
+    crowd::CrowdRow,
     errors::{Errors, SOFT_HALF_ANGLE_RAD},
     scaling::{Bound, ScalingRow},
     speed::Times,
@@ -73,38 +74,39 @@ pub struct Comparison {
     pub rows: Vec<Row>,
     /// One entry a technique and test.
     pub scaling: Vec<ScalingRow>,
+    /// One entry a technique and light, where many instances shadow each other.
+    pub crowd: Vec<CrowdRow>,
     /// Where shadow maps take over from planes, in words.
     pub crossing: String,
 }
-
-/// A table beside the rows: named for readers of the library.
-pub type Scaling = ScalingRow;
 
 impl Comparison {
     pub(super) fn new(
         (request, options): (&FitRequest, &CompareOptions),
         bench: &Bench,
         (settings, errors, times): (&[Setting], &[Errors], &[Times]),
-        scaling: Vec<ScalingRow>,
+        (scaling, crowd): (Vec<ScalingRow>, Vec<CrowdRow>),
     ) -> Self {
-        let row = |((setting, errors), times): ((&Setting, &Errors), &Times)| Row {
-            family: setting.family,
-            technique: setting.name(),
-            world: setting.world,
-            against: setting.against,
-            errors: *errors,
-            times: *times,
-            cost: setting.technique.cost(&bench.stages[setting.world.stage()]),
+        let row = |((setting, errors), times): ((&Setting, &Errors), &Times)| {
+            Some(Row {
+                family: setting.family,
+                technique: setting.name(),
+                world: setting.world,
+                against: setting.against,
+                errors: *errors,
+                times: *times,
+                cost: setting.technique.cost(bench.stage(setting.world)?),
+            })
         };
-        let rows: Vec<Row> = settings.iter().zip(errors).zip(times).map(row).collect();
+        let rows: Vec<Row> = settings.iter().zip(errors).zip(times).filter_map(row).collect();
         Self {
             schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION"),
             command: request.command.clone(),
             model: request.model.display().to_string(),
-            triangles: bench.model.mesh().triangle_count(),
+            triangles: bench.traced(World::Model).mesh().triangle_count(),
             adapter: bench.gpu.adapter_name().to_string(),
-            clock: Timer::new(&bench.stages[0]).clock(),
+            clock: Timer::new(&bench.gpu).clock(),
             size_px: options.size_px,
             views: options.views,
             lights: options.lights,
@@ -113,6 +115,7 @@ impl Comparison {
             crossing: crossing(&rows),
             rows,
             scaling,
+            crowd,
         }
     }
 
@@ -188,6 +191,11 @@ impl Comparison {
             let bound = bound_name(*bound);
             let _ = writeln!(text, "| {technique} | {bound} | {instances} | {frame:.2} | {cpu:.3} | {floor:.2} |");
         }
+        text.push_str("\n| technique | light | instances | mask error | missed + false |\n|---|---|---|---|---|\n");
+        for CrowdRow { technique, light, instances, mask_error, missed, false_ } in &self.crowd {
+            let _ =
+                writeln!(text, "| {technique} | {light} | {instances} | {mask_error:.4} | {missed:.4} + {false_:.4} |");
+        }
         text
     }
 }
@@ -196,7 +204,8 @@ impl Comparison {
 fn world_name(world: World) -> &'static str {
     match world {
         World::Model | World::Planes(_) => "model",
-        World::Ground => "ground",
+        World::Ground | World::PlanesOnGround(_) => "ground",
+        World::Glass => "glass over ground",
     }
 }
 
@@ -204,6 +213,7 @@ fn against_name(against: Against) -> &'static str {
     match against {
         Against::Hard => "hard",
         Against::Soft => "soft",
+        Against::Transmitted => "transmitted",
     }
 }
 
@@ -219,7 +229,9 @@ fn bound_name(bound: Bound) -> &'static str {
 /// Where shadow maps take over from planes while the light moves: below which error, and which map.
 fn crossing(rows: &[Row]) -> String {
     let of = |family| rows.iter().filter(move |row| row.family == family && row.against == Against::Hard);
-    let best = of(Family::Planes).min_by(|a, b| a.errors.mask_error.total_cmp(&b.errors.mask_error));
+    let best = of(Family::Planes)
+        .filter(|row| !row.world.counts_ground())
+        .min_by(|a, b| a.errors.mask_error.total_cmp(&b.errors.mask_error));
     let Some(planes) = best else { return "No planes were compared.".to_string() };
     // The cheapest map that is at least as good.
     let better = of(Family::ShadowMap).filter(|map| map.errors.mask_error <= planes.errors.mask_error);

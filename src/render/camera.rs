@@ -92,6 +92,12 @@ impl Camera {
         self.eye
     }
 
+    /// Is there no perspective?
+    #[must_use]
+    pub fn is_orthographic(&self) -> bool {
+        matches!(self.projection, Projection::Orthographic { .. })
+    }
+
     /// Unit vector of the view.
     #[must_use]
     pub fn forward(&self) -> Vec3 {

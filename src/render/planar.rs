@@ -31,7 +31,7 @@ const SHADOWED: u32 = 2;
 /// Where shadow falls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarOptions {
-    /// Shadow falls on its plane, as far as the scene's ground reaches, which lies in it.
+    /// Shadow falls on its plane, as far as the ground of the instances reaches, which lies in it.
     pub receiver: Receiver,
 }
 

@@ -7,7 +7,7 @@
 //!
 //! Not drawn: self-shadow, since a silhouette has no depth and would put all of a model into its own shadow. For the
 //! same reason not guaranteed: light on a receiver that lies between two casters; the farther one casts on it too. What
-//! is nearer to the light than every caster is lit.
+//! is nearer to the light than every caster is lit. Borders, those at a caster's foot included, are a texel wide.
 
 use super::{
     FrameRequest, RenderError,

@@ -3,8 +3,15 @@
 //! "Rendering Antialiased Shadows with Depth Maps", 1987), whose kernel is also the technique's soft edge.
 //!
 //! A pass draws the casters' depth from the light, a second one the model. One rule for the bias, whatever the size and
-//! the kernel: the rasteriser adds `kernel` times the triangle's depth slope per texel. A filter of n texels reaches n/2
-//! texels to each side, along both axes: a plane's depth changes by at most n times its slope on the way.
+//! the kernel, each half for what one side of the comparison may be off:
+//! * casters: the rasteriser adds `kernel` times the triangle's depth slope per texel. A filter of n texels reaches n/2
+//!   texels to each side, along both axes: a plane's depth changes by at most n times its slope on the way.
+//! * receivers: what is compared with a texel is the depth of the fragment's plane there, where that is nearer to the
+//!   light than the fragment; of the four texels of a bilinear tap, the nearest.
+//!
+//! Each half alone leaves false shadow. Wrong share of the covered pixels at 512 texels, kernel 1: casters' half alone
+//! 2.8 % in a field of 200 bodies under light from above (a steep plane is compared with its gentle neighbour's depth) and
+//! 0.38 % on the teapot; receivers' half alone 0.53 % and 0.54 % (a facet with a gentler one); both 0.18 % and 0.09 %.
 //!
 //! Not guaranteed: shadows of casters nearer to a receiver than that bias.
 
@@ -88,9 +95,9 @@ impl ShadowMap {
         (map, group)
     }
 
-    /// Texels that the filter reaches beyond a lookup.
-    pub(super) fn reach_texels(&self) -> f32 {
-        0.5 * self.options.kernel_texels as f32
+    /// Texels along a side, and how many the filter reaches beyond a lookup.
+    pub(super) fn extent_texels(&self) -> (u32, f32) {
+        (self.options.size_texels, 0.5 * self.options.kernel_texels as f32)
     }
 
     /// Draws the casters from these views: 1, or 6 of a point light.
@@ -107,7 +114,7 @@ impl ShadowMap {
     }
 }
 
-/// The rule of the module, for lookups in `kernel_texels` texels a side.
+/// The casters' half of the module's rule, for lookups in `kernel_texels` texels a side.
 pub(super) fn depth_bias(kernel_texels: u32) -> wgpu::DepthBiasState {
     wgpu::DepthBiasState { constant: BIAS_ULPS, slope_scale: kernel_texels as f32, clamp: 0.0 }
 }
@@ -127,7 +134,7 @@ impl Technique for ShadowMap {
         request: &FrameRequest,
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), RenderError> {
-        let views = views(stage, &request.light, (self.options.size_texels, self.reach_texels()));
+        let views = views(stage, &request.light, self.extent_texels());
         self.redraw(stage, &views, encoder);
         Ok(())
     }

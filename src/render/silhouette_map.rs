@@ -1,15 +1,20 @@
 //! Technique: shadow silhouette maps (P. Sen, M. Cammarano, P. Hanrahan, "Shadow Silhouette Maps", 2003).
 //!
-//! Passes for a light: the casters' depth, then the silhouette's points ([`silhouette_points`](super::silhouette_points)),
-//! in a map of the same size half a texel off. A fragment makes four depth tests, at the corners of its texel of points.
+//! Passes for a light: the casters' depth, then the silhouette's points (`silhouette_points`), in a map of the same size
+//! half a texel off. A fragment makes four depth tests, at the corners of its texel of points.
 //! Where they disagree, lines from the texel's point to those of its four neighbours cut the texel into skewed quadrants,
 //! and the corner of the fragment's own decides: along a straight edge these lines are the edge.
 //!
-//! The bias is that of [`shadow_map`](super::shadow_map) for a kernel of 2: a corner is as far from the fragment as the
-//! texels of a bilinear lookup are. Directional and point lights; a point light has six faces.
+//! The bias is that of [`shadow_map`](super::shadow_map): the casters' half for a kernel of 2, since a corner is as far from
+//! the fragment as the texels of a bilinear lookup are; the receiver's for each corner. Directional and point lights; a
+//! point light has six faces.
 //!
-//! Not guaranteed: several edges in one texel, holes of cut-outs and surfaces that cut through each other, whose borders
-//! there are those of a shadow map; shadows of casters nearer to a receiver than the bias.
+//! Against a shadow map of equal size the pixels wrong along a square plate's shadow are 14 to 24 times fewer at 32 texels,
+//! 160 and more at 128; on the teapot on a ground 4.6 times at 128 and 5.9 at 512.
+//!
+//! Not guaranteed: several edges in one texel, and corners that cover no corner of a texel: they are cut off. Holes of
+//! cut-outs and surfaces that cut through each other have the borders of a shadow map. Shadows of casters nearer to a
+//! receiver than the bias are lost.
 
 use super::{
     FrameRequest, RenderError,
@@ -21,7 +26,7 @@ use super::{
     light_view::views,
     shadow_map::depth_bias,
     silhouette_points::{POINT_FORMAT, SilhouettePoints},
-    stage::{Begin, Part, Placement, Stage, Targets},
+    stage::{Begin, Part, Stage, Targets},
     technique::{Cost, Technique},
     view_matrices::per_instance,
     volume::Casters,
@@ -111,8 +116,7 @@ impl Technique for SilhouetteMap {
         for (number, (&view, face)) in views.iter().zip(&maps.depth.faces).enumerate() {
             self.depth_pass.record(stage, (number, view), face, encoder);
         }
-        let light = |placement: &Placement| placement.light_unit(&request.light).homogeneous();
-        self.points.record(stage, (&views, &light), (&maps.depth, &maps.points), encoder)?;
+        self.points.record(stage, (&views, &request.light), (&maps.depth, &maps.points), encoder)?;
         self.maps = Some(maps);
         stage.gpu.queue.write_buffer(&self.matrices, 0, bytemuck::cast_slice(&per_instance(stage, &views)));
         Ok(())

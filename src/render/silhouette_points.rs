@@ -11,7 +11,7 @@
 //! Not guaranteed: more than one edge a texel (the one nearest to the light stays), edges of cut-out holes.
 
 use super::{
-    RenderError,
+    Light, RenderError,
     bindings::{STORAGE, buffer, depth_texture, group, layout},
     depth_pass::MAP_FORMAT,
     gpu::SILHOUETTE_POINTS,
@@ -24,8 +24,7 @@ use glam::{Mat4, Vec3, Vec4};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Two shares of a texel's sides: 1/255 of a texel is a twentieth of what half-float or finer would have to beat, the
-/// rasteriser's own snapping of corners (1/16 texel).
+/// Two shares of a texel's sides, each off by 1/510 of a texel at most.
 pub(crate) const POINT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg8Unorm;
 
 /// Edges are cut off this far outside the map: a quad is wider than its edge by less than 0.8.
@@ -56,15 +55,14 @@ impl SilhouettePoints {
         Self { casters, pipeline, layout, edges, nearest, side }
     }
 
-    /// Draws the points of each view into its face of `points`, given the depth that it sees. `light` is homogeneous:
-    /// (direction towards it, 0) or (position, 1), unit space of each instance.
+    /// Draws the points of each view of a light into its face of `points`, given the depth that it sees.
     ///
     /// # Errors
     /// The edges exceed the adapter's limits.
     pub fn record(
         &mut self,
         stage: &Stage,
-        (views, light): (&[Mat4], &(dyn Fn(&Placement) -> Vec4 + Sync)),
+        (views, light): (&[Mat4], &Light),
         (depth, points): (&LightMap, &LightMap),
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), RenderError> {
@@ -82,15 +80,10 @@ impl SilhouettePoints {
     }
 
     /// The silhouette of all instances in the map of each view, and which edges are whose.
-    fn edges_of(
-        &self,
-        stage: &Stage,
-        views: &[Mat4],
-        light: &(dyn Fn(&Placement) -> Vec4 + Sync),
-    ) -> (Vec<SilhouetteEdge>, Vec<Range<u32>>) {
+    fn edges_of(&self, stage: &Stage, views: &[Mat4], light: &Light) -> (Vec<SilhouetteEdge>, Vec<Range<u32>>) {
         let corners = self.casters.corners().as_flattened();
         let of_instance = |placement: &Placement| {
-            let sides = self.casters.volume(light(placement)).sides;
+            let sides = self.casters.volume(placement.light_unit(light).homogeneous()).sides;
             let ends = sides.iter().map(|side| [side.start, side.end].map(|corner| corners[corner as usize]));
             (placement.world_from_unit(), ends.collect::<Vec<_>>())
         };

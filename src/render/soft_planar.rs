@@ -9,8 +9,9 @@
 //! The authors average pictures of the lit receiver, Lambert's cosine of each sample included; here the texture
 //! holds visibility alone, as the traced reference under an area light does, so that it needs no colours.
 //!
-//! Not drawn: shadow on anything but the receiver. Not guaranteed: smooth penumbrae; of n samples a side at most n + 1
-//! steps show along an edge that is parallel to a side of the light.
+//! Not drawn: shadow on anything but the receiver. Not guaranteed: smooth penumbrae (of n samples a side, n + 1 steps
+//! show across an edge that is parallel to a side of the light), and light at the foot of a caster that stands on
+//! the receiver: what is under it is blocked, and the filter spreads that by half a texel.
 
 use super::{
     FrameRequest, Light, RenderError,
@@ -35,7 +36,7 @@ const MOST_SAMPLES: u64 = 2048;
 /// A receiver, a light's extent, and how finely both are sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SoftPlanarOptions {
-    /// Where shadow falls: the scene's ground lies in it.
+    /// Where shadow falls: the ground of the instances lies in it.
     pub receiver: Receiver,
     /// Half the edges of the parallelogram that a point light stands for.
     pub half_edges: [Vec3; 2],

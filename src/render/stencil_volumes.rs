@@ -5,15 +5,15 @@
 //! * z-pass (F. Crow, "Shadow Algorithms for Computer Graphics", 1977): faces in front of the surface count. The eye's own
 //!   count must be known. [`Counting::ZPassOutside`] takes it for 0 and is wrong wherever the eye, or the near plane, is in
 //!   a volume; [`Counting::ZPass`] counts on the CPU the triangles between the eye and the light, and keeps the faces
-//!   between the eye and the near plane by depth clamping. All rays of a perspective camera start at that eye; those of an
-//!   orthographic one do not, and there the count holds only while no border of a volume passes between their starts.
+//!   between the eye and the near plane by depth clamping. Without perspective the eye is a point far behind the camera:
+//!   there it is wrong where a light shines along the view to within [`FAR_BEHIND`].
 //! * z-fail (C. Everitt, M. Kilgard, "Practical and Robust Stenciled Shadow Volumes for Hardware-Accelerated Rendering",
 //!   2002): faces behind count, with caps, to infinity; depth clamping keeps those beyond the far plane. Right with the eye
 //!   anywhere. [`Counting::ZFailClipped`] leaves depth clamping out, and is wrong where the far plane cuts a volume open.
 //!
 //! What casts may be a soup (see [`volume`](super::volume)): every triangle counts, but closed bodies cast with one half,
-//! as in the papers above ([`Casters::halved`]). z-pass draws light caps only of casters whose depth the surface may lack: single-sided ones, seen from
-//! behind, and cut-outs, in their holes.
+//! as in the papers above ([`Casters::halved`]). z-pass draws light caps only of casters that may be there without having
+//! left their depth: single-sided ones, seen from behind, and cut-outs, in their holes.
 //!
 //! Not guaranteed: cut-outs and blended materials, which cast as if opaque and whole; 256 volumes over one point, which
 //! the stencil takes for none.
@@ -30,6 +30,10 @@ use super::{
 use crate::scene::Scene;
 use rayon::prelude::*;
 use shadowfit_solver::mesh::{Frame, Sides};
+
+/// From where the parallel rays of an orthographic camera come, world units behind it: scenes are some units large, and
+/// farther away f32 would blur them by more than a thousandth.
+const FAR_BEHIND: f32 = 1e4;
 
 /// How the volumes around a surface are counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,7 +111,9 @@ impl StencilVolumes {
 
     /// Volumes of all instances that the eye is in.
     fn around_eye(&self, stage: &Stage, request: &FrameRequest) -> u32 {
-        let eye = request.camera.eye();
+        let camera = &request.camera;
+        let behind = if camera.is_orthographic() { FAR_BEHIND } else { 0.0 };
+        let eye = camera.eye() - behind * camera.forward();
         let of_instance = |placement: &super::stage::Placement| {
             let eye_unit = placement.rotation.inverse() * (eye - placement.translation) / placement.scale;
             self.volumes.casters().blockers(eye_unit, placement.light_unit(&request.light).homogeneous())

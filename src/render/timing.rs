@@ -4,7 +4,7 @@
 //! time from recording to the end of the work. What a new light makes the CPU do is timed apart. Only ratios within one
 //! run mean something.
 
-use super::{FrameRequest, RenderError, stage::Stage, technique::Technique};
+use super::{FrameRequest, RenderError, gpu::Gpu, stage::Stage, technique::Technique};
 use std::time::{Duration, Instant};
 
 /// Which clock a frame's time comes from.
@@ -46,17 +46,16 @@ struct Timestamps {
 /// Bytes of two timestamps.
 const TWO_TIMESTAMPS: u64 = 16;
 
-/// Times the frames of one stage.
+/// Times frames.
 #[derive(Debug)]
 pub struct Timer {
     timestamps: Option<Timestamps>,
 }
 
 impl Timer {
-    /// For the device of `stage`.
+    /// For the stages of a device.
     #[must_use]
-    pub fn new(stage: &Stage) -> Self {
-        let gpu = &stage.gpu;
+    pub fn new(gpu: &Gpu) -> Self {
         let needed = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS;
         let buffer = |label, usage| {
             gpu.device.create_buffer(&wgpu::BufferDescriptor {

@@ -38,6 +38,12 @@ impl Scene {
         }
     }
 
+    /// Puts the ground into a section of a fitted asset.
+    pub fn label_ground(&mut self, section: u32) {
+        let first = self.section_of.len() - self.ground_triangles;
+        self.section_of[first..].fill(section);
+    }
+
     /// Is that triangle of the ground?
     #[must_use]
     pub fn is_ground(&self, triangle: usize) -> bool {

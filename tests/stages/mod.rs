@@ -41,14 +41,6 @@ impl Case {
         Self::in_world(scene, WORLD)
     }
 
-    /// A committed model; world space is its unit space.
-    pub fn of_model(model: &str) -> Self {
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("models").join(model);
-        let scene = shadowfit::scene::load(&path).expect("a model");
-        let world = Mesh::new(&scene.soup).expect("triangles").frame;
-        Self::in_world(scene, world)
-    }
-
     /// A committed model on a ground of half extent 2; world space is the model's unit space.
     pub fn on_ground(model: &str) -> Self {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("models").join(model);
@@ -68,6 +60,11 @@ impl Case {
         let view = self.traced.look(request).expect("traced");
         let traced = self.traced.picture(&view).expect("traced");
         [traced, self.stage.render(technique, request).expect("drawn")]
+    }
+
+    /// A box on a ground that receives and does not cast.
+    pub fn of_box_on_its_ground() -> Self {
+        Self::new(Scene { ground_triangles: 2, ..box_on_ground() })
     }
 
     /// For each pixel: does the camera see the ground?

@@ -1,9 +1,12 @@
 //! Planar shadows: exact on the ground but for the pixels of borders, whatever the light and wherever casters lie; none on
 //! the casters themselves.
 
-use crate::stages::{
-    Case, WORLD, directional, empty, gpu, ground, ground_errors, keep, mask, plates_over_ground, quad,
-    wrong_off_borders,
+use crate::{
+    golden,
+    stages::{
+        Case, WORLD, directional, empty, golden as compare, gpu, ground, ground_errors, keep, mask, plates_over_ground,
+        quad, wrong_off_borders,
+    },
 };
 use glam::{Quat, Vec2, Vec3};
 use shadowfit::{
@@ -76,10 +79,12 @@ fn casters_keep_their_light_where_they_shadow_each_other() {
 fn overlapping_shadows_are_no_darker() {
     let mut case = Case::new(plates_over_ground(&[(Vec3::new(-0.1, 0.3, 0.0), 0.3), (Vec3::new(0.1, 0.6, 0.0), 0.3)]));
     let mut request = mask(EYE, Vec3::ZERO, directional(-0.7, 1.0, -0.6));
+    let (wrong, blocked) = wrong_and_blocked(&mut case, &request, "overlap");
+    assert!(wrong == 0 && blocked > 0.05, "{wrong} {blocked}");
     let ground = case.ground_seen(&request);
     request.options.mode = Mode::Shaded;
     let picture = case.stage.render(&mut planar(&case), &request).expect("drawn");
-    keep(&picture, "planar overlap.png");
+    keep(&picture, "planar overlap shaded.png");
     let colors: BTreeSet<[u8; 4]> = picture.pixels().zip(&ground).filter(|(_, on)| **on).map(|(p, _)| p.0).collect();
     // One material, one direction, one normal: lit and in shadow, but for silhouettes where the two renderers differ.
     assert_eq!(colors.len(), 2, "{colors:?}");
@@ -226,4 +231,11 @@ fn borders_are_antialiased() {
     let drawn = case.stage.render(&mut planar(&case), &request).expect("drawn");
     let grey = drawn.pixels().filter(|p| p.0[1] == 255 && (1..255).contains(&p.0[0])).count();
     assert!(missed + falsely < 5e-4 && grey > 50, "{missed} {falsely}, {grey} grey pixels");
+}
+
+#[test]
+fn golden_picture() {
+    let mut case = Case::of_box_on_its_ground();
+    let mut technique = planar(&case);
+    compare(&mut case, &mut technique, &golden::request());
 }

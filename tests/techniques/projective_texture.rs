@@ -1,7 +1,10 @@
 //! A projective texture: on the ground errors at borders only, which shrink with the texel; none on the casters; and the
 //! false shadow that a texture without depth must draw.
 
-use crate::stages::{Case, directional, ground_errors, keep, mask, plates_over_ground};
+use crate::{
+    golden,
+    stages::{Case, directional, golden as compare, ground_errors, keep, mask, plates_over_ground},
+};
 use glam::Vec3;
 use shadowfit::render::{
     FrameRequest, Light, RenderError,
@@ -84,4 +87,11 @@ fn a_texture_beyond_the_adapter_is_an_error() {
     let case = Case::new(plates_over_ground(&[(Vec3::Y * 0.5, 0.4)]));
     let options = ProjectiveTextureOptions { size_texels: 1 << 20 };
     assert!(matches!(ProjectiveTexture::new(&case.stage, options), Err(RenderError::TooLarge { .. })));
+}
+
+#[test]
+fn golden_picture() {
+    let mut case = Case::of_box_on_its_ground();
+    let mut technique = projective(&case, 256);
+    compare(&mut case, &mut technique, &golden::request());
 }

@@ -1,7 +1,10 @@
 //! Soft planar shadows: against the reference under an area light, error falls with the samples; a penumbra is as wide as
 //! the light seen through the caster's edge.
 
-use crate::stages::{Case, ground_errors, keep, mask, plates_over_ground};
+use crate::{
+    golden,
+    stages::{Case, golden as compare, ground_errors, keep, mask, plates_over_ground},
+};
 use glam::Vec3;
 use shadowfit::{
     masks::difference,
@@ -141,4 +144,11 @@ fn more_samples_than_half_floats_count_are_an_error() {
     let half_edges = [Vec3::X * 0.1, Vec3::Z * 0.1];
     assert!(soft(&case, half_edges, 45).is_ok());
     assert!(matches!(soft(&case, half_edges, 46), Err(RenderError::TooLarge { .. })));
+}
+
+#[test]
+fn golden_picture() {
+    let mut case = Case::of_box_on_its_ground();
+    let mut technique = soft(&case, [Vec3::ZERO; 2], 4).expect("it fits");
+    compare(&mut case, &mut technique, &golden::request());
 }

@@ -85,6 +85,19 @@ fn z_pass_fails_with_the_eye_in_the_shadow_unless_it_is_counted() {
 }
 
 #[test]
+fn parallel_rays_start_far_behind_the_eye() {
+    let scene = plate_over_ground();
+    // Nearly level, so that the light can stand behind the plate as seen from the eye, and above the ground.
+    let camera = Camera::orthographic(0.2, 0.1);
+    let plate = Vec3::new(0.0, 0.5, 0.0);
+    let to_light = (plate - camera.eye()).normalize();
+    for light in [Light::Directional { to_light }, Light::Point { position: plate + 0.6 * to_light }] {
+        let request = FrameRequest { camera, ..mask(Vec3::ONE, Vec3::ZERO, light) };
+        assert_right("orthographic", &scene, &RIGHT, &request);
+    }
+}
+
+#[test]
 fn z_pass_fails_where_the_near_plane_cuts_a_volume_unless_depth_is_clamped() {
     let scene = plate_over_ground();
     let light = directional(0.0, 1.0, 0.0);
