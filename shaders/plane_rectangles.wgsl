@@ -32,7 +32,7 @@ fn vs_rectangle(@builtin(vertex_index) vertex: u32, @builtin(instance_index) ins
 fn fs_rectangle(corner: Corner) -> @location(0) vec4f {
     let to_edge_px = min(corner.ab, 1.0 - corner.ab) / max(fwidth(corner.ab), vec2f(1e-9));
     let outline = 1.0 - smoothstep(OUTLINE_PX - 1.0, OUTLINE_PX, min(to_edge_px.x, to_edge_px.y));
-    let coverage = sample(rectangles[corner.rectangle].slot, clamp(corner.ab, vec2f(0.0), vec2f(1.0)));
+    let coverage = sample(slot_of(rectangles[corner.rectangle].slot), clamp(corner.ab, vec2f(0.0), vec2f(1.0)));
     let opacity = mix(mix(OPEN, BLOCKING, coverage), 1.0, outline);
     return vec4f(rectangles[corner.rectangle].color.rgb, OPACITY * opacity);
 }

@@ -6,11 +6,21 @@ override EDGE_ON: f32;
 // The value from which a distance field blocks; plane::SDF_BORDER.
 override SDF_BORDER: f32;
 
+// Sections of an instance; an empty one for triangles that belong to none stands behind them.
+override SECTIONS: u32;
+
+// Texels of `casting`: an instance's, and those of a row of the texture.
+override INSTANCE_TEXELS: u32;
+override ROW_TEXELS: u32;
+
 // What a distance field rises by from texel to texel; plane::SDF_PER_TEXEL.
 override SDF_PER_TEXEL: f32;
 
 // Least spread of a soft edge; shade::MIN_SPREAD.
 override MIN_SPREAD: f32;
+
+// Texels of a plane.
+const PLANE_TEXELS: u32 = 4;
 
 // Where an occluder texture lies in the atlas.
 struct OccluderSlot {
@@ -43,14 +53,35 @@ struct Crossing {
     casts: bool,
 }
 
-// The planes that some list below names.
-@group(2) @binding(0) var<storage, read> casting: array<CastingPlane>;
+// What each instance reads under this light, INSTANCE_TEXELS each: a texel a section, where its planes start and
+// end; then the planes, PLANE_TEXELS each, section by section.
+@group(2) @binding(0) var casting: texture_2d<u32>;
 @group(2) @binding(1) var occluders: texture_2d_array<f32>;
 @group(2) @binding(2) var occluder_sampler: sampler;
-// The planes that each section of each instance reads under this light: first the number of sections, then two numbers a
-// section, where its list starts and ends, then the lists, indices into `casting`. Behind the sections of an instance
-// stands an empty one for triangles that belong to none.
-@group(2) @binding(3) var<storage, read> lists: array<u32>;
+
+// Texel number `i` of `casting`.
+fn casting_texel(i: u32) -> vec4u {
+    return textureLoad(casting, vec2u(i % ROW_TEXELS, i / ROW_TEXELS), 0);
+}
+
+fn slot_of(texel: vec4u) -> OccluderSlot {
+    let region = vec4f(vec4u(texel.x & 0xffffu, texel.x >> 16u, texel.y & 0xffffu, texel.y >> 16u));
+    return OccluderSlot(region, (texel.z & 0xffffu) >> 5u, (texel.z >> 3u) & 3u, (texel.z >> 2u) & 1u);
+}
+
+fn casting_plane(i: u32) -> CastingPlane {
+    let slot = casting_texel(i + 3u);
+    return CastingPlane(
+        bitcast<vec4f>(casting_texel(i)),
+        bitcast<vec4f>(casting_texel(i + 1u)),
+        bitcast<vec4f>(casting_texel(i + 2u)),
+        slot_of(slot),
+        bitcast<f32>(slot.w),
+        slot.z & 3u,
+        // As many of its bits as fit: the upper half.
+        bitcast<f32>(slot.z & 0xffff0000u),
+    );
+}
 
 fn on_rectangle(ab: vec2f) -> bool {
     return all(ab >= vec2f(0.0)) && all(ab <= vec2f(1.0));
@@ -120,22 +151,22 @@ fn horizon(n_dot_l: f32, sine: f32) -> f32 {
     return smoothstep(-sine, sine, n_dot_l);
 }
 
-// Where the list of a section starts and ends.
+// The planes that a section of an instance reads: where they start and end in `casting`.
 fn list_of(instance: u32, section: u32) -> vec2u {
-    let sections = lists[0];
-    let entry = 1u + 2u * (instance * (sections + 1u) + min(section, sections));
-    return vec2u(lists[entry], lists[entry + 1u]);
+    let first = instance * INSTANCE_TEXELS;
+    let list = casting_texel(first + min(section, SECTIONS));
+    return vec2u(list.x, list.y);
 }
 
 // Predicted visibility of a receiver at p that reads `list`, under a directional light: left as soon as one plane
 // blocks.
 fn visibility(list: vec2u, p: vec3f) -> f32 {
     var v = 1.0;
-    for (var i = list.x; i < list.y && v > 0.0; i++) {
-        let plane = lists[i];
-        let hit = crossing(casting[plane], p);
+    for (var i = list.x; i < list.y && v > 0.0; i += PLANE_TEXELS) {
+        let plane = casting_plane(i);
+        let hit = crossing(plane, p);
         if hit.casts {
-            v *= 1.0 - sample(casting[plane].slot, hit.ab);
+            v *= 1.0 - sample(plane.slot, hit.ab);
         }
     }
     return v;
@@ -144,13 +175,13 @@ fn visibility(list: vec2u, p: vec3f) -> f32 {
 // The same with soft edges.
 fn visibility_soft(list: vec2u, p: vec3f) -> f32 {
     var v = 1.0;
-    for (var i = list.x; i < list.y && v > 0.0; i++) {
-        let plane = lists[i];
+    for (var i = list.x; i < list.y && v > 0.0; i += PLANE_TEXELS) {
+        let plane = casting_plane(i);
         let p1 = vec4f(p, 1.0);
-        let s = dot(casting[plane].s, p1);
-        if s > casting[plane].bias {
-            let ab = vec2f(dot(casting[plane].a, p1), dot(casting[plane].b, p1));
-            v *= 1.0 - sample_soft(casting[plane].slot, ab, spread(casting[plane].softening, s));
+        let s = dot(plane.s, p1);
+        if s > plane.bias {
+            let ab = vec2f(dot(plane.a, p1), dot(plane.b, p1));
+            v *= 1.0 - sample_soft(plane.slot, ab, spread(plane.softening, s));
         }
     }
     return v;
@@ -159,11 +190,11 @@ fn visibility_soft(list: vec2u, p: vec3f) -> f32 {
 // The same as `visibility` under a point light at c.
 fn visibility_point_light(list: vec2u, c: vec3f, p: vec3f) -> f32 {
     var v = 1.0;
-    for (var i = list.x; i < list.y && v > 0.0; i++) {
-        let plane = lists[i];
-        let hit = crossing_point_light(casting[plane], c, p);
+    for (var i = list.x; i < list.y && v > 0.0; i += PLANE_TEXELS) {
+        let plane = casting_plane(i);
+        let hit = crossing_point_light(plane, c, p);
         if hit.casts {
-            v *= 1.0 - sample(casting[plane].slot, hit.ab);
+            v *= 1.0 - sample(plane.slot, hit.ab);
         }
     }
     return v;

@@ -11,7 +11,8 @@ struct Rectangle {
     b: vec4f,
     // Linear RGB.
     color: vec4f,
-    slot: OccluderSlot,
+    // As a plane's last texel in `casting`.
+    slot: vec4u,
 }
 
-@group(2) @binding(4) var<storage, read> rectangles: array<Rectangle>;
+@group(2) @binding(3) var<storage, read> rectangles: array<Rectangle>;

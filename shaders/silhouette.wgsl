@@ -1,8 +1,5 @@
 // Pass: the casters as a light sees them, 1 wherever one is.
 
-// Do images cut holes into what is drawn?
-override HAS_HOLES: bool;
-
 @fragment
 fn fs_silhouette(depth: Depth) -> @location(0) f32 {
     if HAS_HOLES && is_hole_at(depth.material, depth.uv) {

@@ -1,5 +1,8 @@
 // Snippet: a fragment of the model, and its shading given what the technique says of the light.
 
+// Do the images of these materials cut holes? A software rasteriser pays for the look-up in every fragment.
+override HAS_HOLES: bool = true;
+
 override AMBIENT: f32;
 override DIFFUSE: f32;
 
@@ -66,7 +69,7 @@ fn is_hole_at(number: u32, uv: vec2f) -> bool {
 }
 
 fn is_hole(surface: Surface) -> bool {
-    return is_hole_at(surface.material, surface.uv);
+    return HAS_HOLES && is_hole_at(surface.material, surface.uv);
 }
 
 // Does the side of the surface that is drawn face the light?

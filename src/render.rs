@@ -10,6 +10,7 @@
 mod atlas;
 mod bindings;
 mod camera;
+mod casting;
 pub mod cpu;
 mod depth_pass;
 pub mod field;
@@ -187,8 +188,8 @@ pub enum RenderError {
         /// Pixels.
         limit: u32,
     },
-    /// A technique needs what the adapter does not have.
-    #[error("{technique} needs {feature}, which the adapter does not have")]
+    /// A technique needs what the adapter, the light or the planes do not give.
+    #[error("{technique} needs {feature}, and that is not given")]
     Unsupported {
         /// Who.
         technique: &'static str,

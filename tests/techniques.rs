@@ -6,11 +6,15 @@
 mod fits;
 #[path = "techniques/golden.rs"]
 mod golden;
+#[path = "techniques/occluder_planes.rs"]
+mod occluder_planes;
 #[path = "techniques/perspective_shadow_map.rs"]
 mod perspective_shadow_map;
 mod pictures;
 #[path = "techniques/planar.rs"]
 mod planar;
+#[allow(dead_code, reason = "each test binary uses its part")]
+mod procedural;
 #[path = "techniques/projective_texture.rs"]
 mod projective_texture;
 #[path = "techniques/shadow_map.rs"]

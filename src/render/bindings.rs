@@ -32,6 +32,13 @@ pub(crate) const fn texture(view_dimension: TextureViewDimension) -> BindingType
     }
 }
 
+/// A 2D texture of integers.
+pub(crate) const INTEGERS: BindingType = BindingType::Texture {
+    sample_type: TextureSampleType::Uint,
+    view_dimension: TextureViewDimension::D2,
+    multisampled: false,
+};
+
 /// A depth texture.
 pub(crate) const fn depth_texture(view_dimension: TextureViewDimension) -> BindingType {
     BindingType::Texture { sample_type: TextureSampleType::Depth, view_dimension, multisampled: false }

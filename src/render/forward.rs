@@ -8,6 +8,7 @@ use super::{
     gpu::{Gpu, Shader},
     layout::{VERTEX_ATTRIBUTES, Vertex},
     stage::{Part, Stage, Targets, color_format},
+    upload::Batch,
 };
 use std::collections::BTreeMap;
 
@@ -15,6 +16,7 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct PipelineKey {
     double_sided: bool,
+    has_holes: bool,
     mode: Mode,
     antialias: Antialias,
     point_light: bool,
@@ -86,22 +88,32 @@ impl Forward {
         targets: &Targets,
         (pass, part): (&mut wgpu::RenderPass<'_>, Part),
     ) {
-        let pipelines = [false, true].map(|double_sided| {
-            let key = PipelineKey {
-                double_sided,
-                mode: request.options.mode,
-                antialias: request.options.antialias,
-                point_light: matches!(request.light, Light::Point { .. }),
-            };
-            let made = self.made.get(&key).cloned();
-            made.unwrap_or_else(|| {
+        self.draw_sections(stage, request, targets, (pass, part, &|_| true));
+    }
+
+    /// The same of the sections that are wanted, by their labels.
+    pub fn draw_sections(
+        &mut self,
+        stage: &Stage,
+        request: &FrameRequest,
+        targets: &Targets,
+        (pass, part, wanted): (&mut wgpu::RenderPass<'_>, Part, &dyn Fn(u32) -> bool),
+    ) {
+        let key = |batch: &Batch| PipelineKey {
+            double_sided: batch.double_sided,
+            has_holes: batch.has_holes,
+            mode: request.options.mode,
+            antialias: request.options.antialias,
+            point_light: matches!(request.light, Light::Point { .. }),
+        };
+        for key in stage.model.batches.iter().map(key) {
+            if !self.made.contains_key(&key) {
                 let pipeline = self.pipeline(&stage.gpu, key, targets.depth_format);
-                self.made.insert(key, pipeline.clone());
-                pipeline
-            })
-        });
+                self.made.insert(key, pipeline);
+            }
+        }
         stage.bind(pass);
-        stage.draw(pass, part, |batch| &pipelines[usize::from(batch.double_sided)]);
+        stage.draw_sections(pass, (part, wanted), |batch| &self.made[&key(batch)]);
     }
 
     fn pipeline(&self, gpu: &Gpu, key: PipelineKey, format: wgpu::TextureFormat) -> wgpu::RenderPipeline {
@@ -110,6 +122,7 @@ impl Forward {
         let mut constants = self.options.constants.clone();
         constants.extend([
             ("POINT_LIGHT", f64::from(u8::from(key.point_light))),
+            ("HAS_HOLES", f64::from(u8::from(key.has_holes))),
             ("AMBIENT", f64::from(AMBIENT)),
             ("DIFFUSE", f64::from(DIFFUSE)),
         ]);

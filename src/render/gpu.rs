@@ -42,7 +42,12 @@ macro_rules! forward {
 pub const CONSTANT_VISIBILITY: Shader = forward!("constant_visibility", "constant_visibility.wgsl");
 /// The model with shadow planes.
 pub const OCCLUDER_PLANES: Shader = forward!("occluder_planes", "planes.wgsl", "occluder_planes.wgsl");
-/// The same, with lines where the planes cut it.
+/// The same with coordinates interpolated from the vertices.
+pub const VERTEX_COORDINATES: Shader = Shader {
+    name: "vertex_coordinates",
+    parts: parts!["frame.wgsl", "surface.wgsl", "planes.wgsl", "vertex_coordinates.wgsl"],
+};
+/// The model with shadow planes, with lines where the planes cut it.
 pub const PLANE_CUTS: Shader =
     forward!("plane_cuts", "planes.wgsl", "occluder_planes.wgsl", "rectangles.wgsl", "plane_cuts.wgsl");
 /// The planes drawn through the model.
@@ -81,6 +86,7 @@ pub const VERTEX_VISIBILITY: Shader = forward!("vertex_visibility", "vertex_visi
 pub const SHADERS: &[Shader] = &[
     CONSTANT_VISIBILITY,
     OCCLUDER_PLANES,
+    VERTEX_COORDINATES,
     PLANE_CUTS,
     PLANE_RECTANGLES,
     DEPTH,

@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3, Vec4};
 use shadowfit_solver::{
     plane::{BakedPlane, Encoding, ShadowPlane, Side},
-    shade::{self, PlaneRows},
+    shade,
 };
 use std::mem::offset_of;
 
@@ -28,73 +28,64 @@ pub struct Instance {
     pub light: Vec4,
 }
 
-/// `OccluderSlot` of planes.wgsl.
+/// A texel that planes.wgsl makes an `OccluderSlot` of, and what else a plane has beside its rows.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub struct OccluderSlot {
-    pub region: Vec4,
-    pub layer: u32,
-    pub channel: u32,
-    pub encoding: u32,
-    pub padding: u32,
-}
-
-impl From<&Slot> for OccluderSlot {
-    fn from(slot: &Slot) -> Self {
-        let ([x, y], [w, h]) = (slot.corner, slot.size);
-        let region = Vec4::from_array([x, y, w, h].map(|n| n as f32));
-        let encoding = match slot.encoding {
-            Encoding::Coverage => 0,
-            Encoding::Sdf => 1,
-        };
-        Self { region, layer: slot.layer, channel: slot.channel, encoding, padding: 0 }
-    }
-}
-
-/// `CastingPlane` of planes.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub struct CastingPlane {
-    pub a: Vec4,
-    pub b: Vec4,
-    pub s: Vec4,
-    pub slot: OccluderSlot,
+pub struct SlotTexel {
+    pub region: [u16; 4],
+    /// From the lowest bit: side (2 bits), encoding (1), channel (2), layer (11), the upper half of the softening.
+    pub bits: u32,
     pub bias: f32,
-    pub side: u32,
-    pub softening: f32,
-    pub padding: u32,
 }
 
-impl CastingPlane {
-    /// The plane under a directional light of an angular radius, or `None` where it casts nothing.
-    pub fn directional(baked: &BakedPlane, slot: &Slot, to_light: Vec3, radius_rad: f32) -> Option<Self> {
-        let PlaneRows { a, b, s } = shade::plane_rows(&baked.plane, baked.side, to_light)?;
-        Some(Self {
-            softening: shade::softening(baked, to_light, radius_rad),
-            ..Self::checked([a, b, s], baked, slot)?
-        })
-    }
-
-    /// The plane under a point light, or `None` where it has no area.
-    pub fn point_light(baked: &BakedPlane, slot: &Slot) -> Option<Self> {
-        let [equation, a, b] = plane_and_duals(&baked.plane);
-        if equation.truncate() == Vec3::ZERO { None } else { Self::checked([a, b, equation], baked, slot) }
-    }
-
-    /// Rows that are not finite (a plane of nearly no area) never reach the shader: it may not branch on NaN.
-    fn checked([a, b, s]: [Vec4; 3], baked: &BakedPlane, slot: &Slot) -> Option<Self> {
+impl SlotTexel {
+    /// Of a plane whose texture lies in `slot`; edges do not soften.
+    pub fn new(baked: &BakedPlane, slot: &Slot) -> Self {
+        let ([x, y], [w, h]) = (slot.corner, slot.size);
         let side = match baked.side {
             Side::Both => 0,
             Side::Front => 1,
             Side::Back => 2,
         };
-        let plane = Self { a, b, s, slot: slot.into(), bias: baked.bias, side, softening: 0.0, padding: 0 };
-        (a.is_finite() && b.is_finite() && s.is_finite() && baked.bias.is_finite()).then_some(plane)
+        let encoding = match slot.encoding {
+            Encoding::Coverage => 0,
+            Encoding::Sdf => 1,
+        };
+        Self {
+            region: [x, y, w, h].map(|texels| texels as u16),
+            bits: side | encoding << 2 | slot.channel << 3 | slot.layer << 5,
+            bias: baked.bias,
+        }
+    }
+}
+
+/// The texels that planes.wgsl makes a `CastingPlane` of.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct CastingTexels {
+    pub a: Vec4,
+    pub b: Vec4,
+    pub s: Vec4,
+    pub slot: SlotTexel,
+}
+
+impl SlotTexel {
+    /// The same with edges that soften, rounded to 8 bits: a penumbra is 0.2 % too wide or narrow.
+    pub fn with_softening(self, softening: f32) -> Self {
+        Self { bits: self.bits | softening.to_bits().saturating_add(1 << 15) & 0xffff_0000, ..self }
+    }
+}
+
+impl CastingTexels {
+    /// Rows that are not finite (a plane of nearly no area) never reach the shader: it may not branch on NaN.
+    pub fn checked([a, b, s]: [Vec4; 3], slot: SlotTexel) -> Option<Self> {
+        let finite = a.is_finite() && b.is_finite() && s.is_finite() && slot.bias.is_finite();
+        finite.then_some(Self { a, b, s, slot })
     }
 }
 
 /// The equation (n, -n.o) of a plane and the rows of its edges' duals: dot with (p, 1).
-fn plane_and_duals(plane: &ShadowPlane) -> [Vec4; 3] {
+pub fn plane_and_duals(plane: &ShadowPlane) -> [Vec4; 3] {
     let (dual_a, dual_b) = shade::duals(plane);
     [plane.normal(), dual_a, dual_b].map(|row| row.extend(-row.dot(plane.origin)))
 }
@@ -110,12 +101,13 @@ pub struct Rectangle {
     pub a: Vec4,
     pub b: Vec4,
     pub color: Vec4,
-    pub slot: OccluderSlot,
+    pub slot: SlotTexel,
 }
 
 impl Rectangle {
     /// The rectangle in a linear colour.
-    pub fn new(plane: &ShadowPlane, slot: &Slot, color_linear: Vec3) -> Self {
+    pub fn new(baked: &BakedPlane, slot: &Slot, color_linear: Vec3) -> Self {
+        let plane = &baked.plane;
         let [equation, a, b] = plane_and_duals(plane);
         Self {
             origin: plane.origin.extend(1.0),
@@ -125,7 +117,7 @@ impl Rectangle {
             a,
             b,
             color: color_linear.extend(1.0),
-            slot: slot.into(),
+            slot: SlotTexel::new(baked, slot),
         }
     }
 
@@ -197,8 +189,6 @@ pub fn struct_layouts() -> Vec<StructLayout> {
     vec![
         layout!(Frame { clip_from_world, light, eye }),
         layout!(Instance { clip_from_unit, world_from_unit, light }),
-        layout!(OccluderSlot { region, layer, channel, encoding }),
-        layout!(CastingPlane { a, b, s, slot, bias, side, softening }),
         layout!(Rectangle { origin, u, v, plane, a, b, color, slot }),
         layout!(SilhouetteEdge { a, b }),
         layout!(Material { base_color, alpha_cutoff, repeat_u, repeat_v }),

@@ -8,20 +8,40 @@
 use super::{
     FrameRequest, Light, Mode, RenderError,
     atlas::{Atlas, Slot},
-    bindings::{SAMPLER, STORAGE, buffer, group, layout, texture},
+    bindings::{Binding, INTEGERS, SAMPLER, group, layout, texture},
+    casting::{Casting, choices},
     forward::{Forward, ForwardOptions},
-    gpu::{Gpu, OCCLUDER_PLANES},
-    layout::CastingPlane,
+    gpu::{CONSTANT_VISIBILITY, Gpu, OCCLUDER_PLANES, VERTEX_COORDINATES},
     plane_view::PlaneView,
     stage::{Begin, Part, Stage, Targets},
     technique::{Cost, Technique},
 };
 use shadowfit_solver::{
-    plane::{BakedSet, SDF_BORDER, SDF_PER_TEXEL, SectionLists},
+    plane::{BakedSet, SDF_BORDER, SDF_PER_TEXEL},
     shade::{EDGE_ON, MIN_SPREAD},
 };
-use std::collections::BTreeSet;
 use wgpu::util::{DeviceExt, TextureDataOrder};
+
+/// Name of the variant with coordinates at vertices.
+const PER_VERTEX: &str = "occluder planes, per vertex";
+
+/// Bindings 0 to 2 of group 2, those of planes.wgsl.
+pub(crate) const BINDINGS: [Binding; 3] = [
+    (wgpu::ShaderStages::VERTEX_FRAGMENT, INTEGERS),
+    (wgpu::ShaderStages::FRAGMENT, texture(wgpu::TextureViewDimension::D2Array)),
+    (wgpu::ShaderStages::FRAGMENT, SAMPLER),
+];
+
+/// Where the coordinates on the planes are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Coordinates {
+    PerFragment,
+    PerVertex,
+}
+
+/// Most planes of a list whose coordinates are computed at vertices; MOST of vertex_coordinates.wgsl. The model's own
+/// attributes and two locations a plane leave room for no fifth among the 15 that every adapter has.
+const MOST_AT_VERTICES: usize = 4;
 
 /// Draws the model with the shadows of a baked set.
 #[derive(Debug)]
@@ -29,14 +49,17 @@ pub struct OccluderPlanes {
     set: BakedSet,
     /// Angular radius of directional lights; 0: hard edges.
     light_radius_rad: f32,
+    coordinates: Coordinates,
     /// One a plane.
     slots: Vec<Slot>,
     atlas_bytes: usize,
-    casting: wgpu::Buffer,
-    lists: wgpu::Buffer,
+    casting: Casting,
+    constants: Vec<(&'static str, f64)>,
     occluders: wgpu::TextureView,
     sampler: wgpu::Sampler,
     group: wgpu::BindGroup,
+    /// Draws the sections that read no plane under this light.
+    bare: Forward,
     forward: Forward,
     /// What mode `planes` draws over the model; made when first needed.
     view: Option<PlaneView>,
@@ -51,11 +74,31 @@ impl OccluderPlanes {
         Self::soft(stage, set, 0.0)
     }
 
+    /// The same with coordinates that are interpolated from the vertices, as in the thesis. Point lights are refused:
+    /// coordinates under them are not affine.
+    ///
+    /// # Errors
+    /// As of [`OccluderPlanes::new`], and [`RenderError::Unsupported`] where a section reads more than 4 planes.
+    pub fn per_vertex(stage: &Stage, set: &BakedSet) -> Result<Self, RenderError> {
+        if choices(set).flatten().any(|list| list.len() > MOST_AT_VERTICES) {
+            return Err(RenderError::Unsupported { technique: PER_VERTEX, feature: "lists of at most 4 planes" });
+        }
+        Self::with(stage, set, (0.0, Coordinates::PerVertex))
+    }
+
     /// The same with soft edges: directional lights have this angular radius (the sun: 0.0047), 0 to pi/4.
     ///
     /// # Errors
     /// As of [`OccluderPlanes::new`].
     pub fn soft(stage: &Stage, set: &BakedSet, light_radius_rad: f32) -> Result<Self, RenderError> {
+        Self::with(stage, set, (light_radius_rad, Coordinates::PerFragment))
+    }
+
+    fn with(
+        stage: &Stage,
+        set: &BakedSet,
+        (light_radius_rad, coordinates): (f32, Coordinates),
+    ) -> Result<Self, RenderError> {
         let gpu = &stage.gpu;
         let limits = gpu.limits();
         let textures: Vec<_> = set.planes.iter().map(|baked| &baked.texture).collect();
@@ -67,29 +110,35 @@ impl OccluderPlanes {
             min_filter: wgpu::FilterMode::Linear,
             ..Default::default()
         });
-        let (count, storage) = (stage.placements().len(), wgpu::BufferUsages::STORAGE);
-        let casting = buffer::<CastingPlane>(gpu, "casting", count * most_planes(set), storage);
-        let per_instance = 2 * (set.sections.len() + 1) + longest(set);
-        let lists = buffer::<u32>(gpu, "lists", 1 + count * per_instance, storage);
-        let fragment = wgpu::ShaderStages::FRAGMENT;
-        let array = texture(wgpu::TextureViewDimension::D2Array);
-        let bindings = [(fragment, STORAGE), (fragment, array), (fragment, SAMPLER), (fragment, STORAGE)];
-        let group_layout = layout(gpu, "planes", &bindings);
-        let options = ForwardOptions { constants: forward_constants(light_radius_rad), ..Default::default() };
-        let forward = Forward::new(stage, &OCCLUDER_PLANES, Some(&group_layout), options);
-        let group = group(gpu, &group_layout, &resources((&casting, &lists), &occluders, &sampler));
+        let casting = Casting::new(gpu, (set, light_radius_rad), &atlas.slots, stage.placements().len())?;
+        let mut constants: Vec<_> = CONSTANTS.map(|(name, value)| (name, f64::from(value))).to_vec();
+        constants.extend(casting.constants());
+        let group_layout = layout(gpu, "planes", &BINDINGS);
+        let options = ForwardOptions { constants: vec![("VISIBILITY", 1.0)], ..Default::default() };
+        let bare = Forward::new(stage, &CONSTANT_VISIBILITY, None, options);
+        let mut options = ForwardOptions { constants: with_light(&constants, light_radius_rad), ..Default::default() };
+        let mut shader = &OCCLUDER_PLANES;
+        if coordinates == Coordinates::PerVertex {
+            options.constants.clone_from(&constants);
+            options.entry_points = ["vs_coordinates", "fs_coordinates_shaded", "fs_coordinates_mask"];
+            shader = &VERTEX_COORDINATES;
+        }
+        let forward = Forward::new(stage, shader, Some(&group_layout), options);
+        let group = group(gpu, &group_layout, &resources(&casting, &occluders, &sampler));
         gpu.check()?;
         let (set, slots, atlas_bytes) = (set.clone(), atlas.slots, atlas.rgba.len());
         Ok(Self {
             set,
             light_radius_rad,
+            coordinates,
             slots,
             atlas_bytes,
             casting,
-            lists,
+            constants,
             occluders,
             sampler,
             group,
+            bare,
             forward,
             view: None,
         })
@@ -102,54 +151,24 @@ impl OccluderPlanes {
 
     /// The pipeline constants of planes.wgsl and occluder_planes.wgsl.
     pub(crate) fn forward_constants(&self) -> Vec<(&'static str, f64)> {
-        forward_constants(self.light_radius_rad)
+        with_light(&self.constants, self.light_radius_rad)
     }
 
-    /// Bindings 0 to 3 of group 2.
-    pub(crate) fn resources(&self) -> [wgpu::BindingResource<'_>; 4] {
-        resources((&self.casting, &self.lists), &self.occluders, &self.sampler)
+    /// Those of planes.wgsl.
+    pub(crate) fn constants(&self) -> &[(&'static str, f64)] {
+        &self.constants
     }
 
-    /// The planes that cast in each instance under its light and are read by some section, and `lists` of planes.wgsl.
-    fn casting_under(&self, stage: &Stage, light: &Light) -> (Vec<CastingPlane>, Vec<u32>) {
-        let (sections, instances) = (self.set.sections.len(), stage.placements().len());
-        let (mut casting, mut ranges, mut lists) = (Vec::new(), vec![sections as u32], Vec::new());
-        let start = 1 + 2 * instances * (sections + 1);
-        // Several sections may read a plane: its rows are made once.
-        let mut number_of: Vec<Option<Option<u32>>> = Vec::new();
-        for placement in stage.placements() {
-            let light = placement.light_unit(light);
-            let chosen = self.set.lists(light.from_centre());
-            number_of.clear();
-            number_of.resize(self.set.planes.len(), None);
-            for section in 0..=sections {
-                ranges.push((start + lists.len()) as u32);
-                for &plane in chosen.get(section).map_or(&[][..], Vec::as_slice) {
-                    let number = number_of[plane as usize].get_or_insert_with(|| {
-                        casting.push(self.casting_plane(plane as usize, &light)?);
-                        Some(casting.len() as u32 - 1)
-                    });
-                    lists.extend(*number);
-                }
-                ranges.push((start + lists.len()) as u32);
-            }
-        }
-        ranges.extend(lists);
-        (casting, ranges)
-    }
-
-    fn casting_plane(&self, index: usize, light_unit: &Light) -> Option<CastingPlane> {
-        let (baked, slot) = (&self.set.planes[index], &self.slots[index]);
-        match *light_unit {
-            Light::Directional { to_light } => CastingPlane::directional(baked, slot, to_light, self.light_radius_rad),
-            Light::Point { .. } => CastingPlane::point_light(baked, slot),
-        }
+    /// Bindings 0 to 2 of group 2.
+    pub(crate) fn resources(&self) -> [wgpu::BindingResource<'_>; 3] {
+        resources(&self.casting, &self.occluders, &self.sampler)
     }
 }
 
 impl Technique for OccluderPlanes {
     fn name(&self) -> String {
         match self.light_radius_rad {
+            _ if self.coordinates == Coordinates::PerVertex => PER_VERTEX.to_string(),
             0.0 => "occluder planes".to_string(),
             radius_rad => format!("occluder planes, light radius {:.2} deg", radius_rad.to_degrees()),
         }
@@ -161,9 +180,10 @@ impl Technique for OccluderPlanes {
         request: &FrameRequest,
         _: &mut wgpu::CommandEncoder,
     ) -> Result<(), RenderError> {
-        let (casting, lists) = self.casting_under(stage, &request.light);
-        stage.gpu.queue.write_buffer(&self.casting, 0, bytemuck::cast_slice(&casting));
-        stage.gpu.queue.write_buffer(&self.lists, 0, bytemuck::cast_slice(&lists));
+        if self.coordinates == Coordinates::PerVertex && matches!(request.light, Light::Point { .. }) {
+            return Err(RenderError::Unsupported { technique: PER_VERTEX, feature: "a directional light" });
+        }
+        self.casting.update(&stage.gpu, &self.set, stage.placements(), &request.light);
         Ok(())
     }
 
@@ -181,62 +201,47 @@ impl Technique for OccluderPlanes {
             return Ok(());
         }
         let mut pass = targets.begin(encoder, (request.options.mode, Begin::Clear));
+        let casting = &self.casting;
+        self.bare.draw_sections(stage, request, targets, (&mut pass, Part::All, &|label| !casting.is_asked(label)));
         pass.set_bind_group(2, &self.group, &[]);
-        self.forward.draw(stage, request, targets, (&mut pass, Part::All));
+        self.forward.draw_sections(stage, request, targets, (&mut pass, Part::All, &|label| casting.is_asked(label)));
         Ok(())
     }
 
     fn cost(&self, stage: &Stage) -> Cost {
         Cost {
             passes: 1,
-            draw_calls: stage.calls_per_pass(),
+            draw_calls: [true, false]
+                .map(|asked| stage.calls_over(&|label| self.casting.is_asked(label) == asked))
+                .iter()
+                .sum(),
             update_passes: 0,
             update_draw_calls: 0,
-            texture_bytes: self.atlas_bytes,
-            buffer_bytes: (self.casting.size() + self.lists.size()) as usize,
+            texture_bytes: self.atlas_bytes + self.casting.bytes(),
+            buffer_bytes: 0,
             on_light_change: "three rows a casting plane and the sections' lists, per instance, on the CPU".to_string(),
         }
     }
 }
 
-/// The pipeline constants of planes.wgsl.
-pub(crate) fn constants() -> [(&'static str, f64); 4] {
-    [
-        ("EDGE_ON", f64::from(EDGE_ON)),
-        ("SDF_BORDER", f64::from(SDF_BORDER)),
-        ("SDF_PER_TEXEL", f64::from(SDF_PER_TEXEL)),
-        ("MIN_SPREAD", f64::from(MIN_SPREAD)),
-    ]
-}
+/// The pipeline constants of planes.wgsl that are constants of the solver.
+const CONSTANTS: [(&str, f32); 4] =
+    [("EDGE_ON", EDGE_ON), ("SDF_BORDER", SDF_BORDER), ("SDF_PER_TEXEL", SDF_PER_TEXEL), ("MIN_SPREAD", MIN_SPREAD)];
 
-fn forward_constants(light_radius_rad: f32) -> Vec<(&'static str, f64)> {
-    let mut all = constants().to_vec();
+/// Those of planes.wgsl and of occluder_planes.wgsl.
+fn with_light(constants: &[(&'static str, f64)], light_radius_rad: f32) -> Vec<(&'static str, f64)> {
+    let mut all = constants.to_vec();
     all.push(("LIGHT_SINE", f64::from(light_radius_rad.sin())));
     all
 }
 
 fn resources<'a>(
-    (casting, lists): (&'a wgpu::Buffer, &'a wgpu::Buffer),
+    casting: &'a Casting,
     occluders: &'a wgpu::TextureView,
     sampler: &'a wgpu::Sampler,
-) -> [wgpu::BindingResource<'a>; 4] {
-    let (occluders, sampler) = (wgpu::BindingResource::TextureView(occluders), wgpu::BindingResource::Sampler(sampler));
-    [casting.as_entire_binding(), occluders, sampler, lists.as_entire_binding()]
-}
-
-/// All lists that a light may choose.
-fn choices(set: &BakedSet) -> impl Iterator<Item = &SectionLists> {
-    set.active.iter().flat_map(|active| &active.lists).chain([&set.sections])
-}
-
-/// Indices in all lists of a set, under the light where there are most.
-fn longest(set: &BakedSet) -> usize {
-    choices(set).map(|lists| lists.iter().map(Vec::len).sum()).max().unwrap_or(0)
-}
-
-/// Planes that are in some list, under the light where there are most.
-fn most_planes(set: &BakedSet) -> usize {
-    choices(set).map(|lists| lists.iter().flatten().collect::<BTreeSet<_>>().len()).max().unwrap_or(0)
+) -> [wgpu::BindingResource<'a>; 3] {
+    let [casting, occluders] = [&casting.view, occluders].map(wgpu::BindingResource::TextureView);
+    [casting, occluders, wgpu::BindingResource::Sampler(sampler)]
 }
 
 fn upload_atlas(gpu: &Gpu, atlas: &Atlas) -> wgpu::TextureView {

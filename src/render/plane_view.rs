@@ -4,11 +4,11 @@
 use super::{
     FrameRequest, Mode,
     atlas::Slot,
-    bindings::{SAMPLER, STORAGE, buffer, group, layout, texture},
+    bindings::{STORAGE, buffer, group, layout},
     forward::{Forward, ForwardOptions},
     gpu::{PLANE_CUTS, PLANE_RECTANGLES},
     layout::Rectangle,
-    occluder_planes::{OccluderPlanes, constants},
+    occluder_planes::{BINDINGS, OccluderPlanes},
     stage::{Begin, Part, Stage, Targets, color_format},
 };
 use glam::Vec3;
@@ -32,6 +32,7 @@ pub(crate) struct PlaneView {
     group: wgpu::BindGroup,
     cuts: Forward,
     module: wgpu::ShaderModule,
+    constants: Vec<(&'static str, f64)>,
     layout: wgpu::PipelineLayout,
     /// Hidden planes and visible ones, by the samples of a pixel.
     made: BTreeMap<u32, [wgpu::RenderPipeline; 2]>,
@@ -43,13 +44,11 @@ impl PlaneView {
         let gpu = &stage.gpu;
         let count = technique.planes().0.planes.len();
         let rectangles = buffer::<Rectangle>(gpu, "rectangles", count, wgpu::BufferUsages::STORAGE);
-        let (fragment, both) = (wgpu::ShaderStages::FRAGMENT, wgpu::ShaderStages::VERTEX_FRAGMENT);
-        let array = texture(wgpu::TextureViewDimension::D2Array);
-        let bindings =
-            [(fragment, STORAGE), (fragment, array), (fragment, SAMPLER), (fragment, STORAGE), (both, STORAGE)];
+        let mut bindings = BINDINGS.to_vec();
+        bindings.push((wgpu::ShaderStages::VERTEX_FRAGMENT, STORAGE));
         let group_layout = layout(gpu, "plane view", &bindings);
-        let [casting, occluders, sampler, lists] = technique.resources();
-        let group = group(gpu, &group_layout, &[casting, occluders, sampler, lists, rectangles.as_entire_binding()]);
+        let [casting, occluders, sampler] = technique.resources();
+        let group = group(gpu, &group_layout, &[casting, occluders, sampler, rectangles.as_entire_binding()]);
         let options = ForwardOptions {
             entry_points: ["vs_surface", "fs_plane_cuts", "fs_mask"],
             constants: technique.forward_constants(),
@@ -61,7 +60,15 @@ impl PlaneView {
             ..Default::default()
         });
         let module = gpu.module(&PLANE_RECTANGLES);
-        Self { rectangles, group, cuts, module, layout, made: BTreeMap::new() }
+        Self {
+            rectangles,
+            group,
+            cuts,
+            module,
+            constants: technique.constants().to_vec(),
+            layout,
+            made: BTreeMap::new(),
+        }
     }
 
     /// Records the frame.
@@ -97,7 +104,7 @@ impl PlaneView {
         (samples, format): (u32, wgpu::TextureFormat),
         (compare, opacity): (wgpu::CompareFunction, f64),
     ) -> wgpu::RenderPipeline {
-        let mut constants = constants().to_vec();
+        let mut constants = self.constants.to_vec();
         constants.extend([("POINT_LIGHT", 0.0), ("OPACITY", opacity)]);
         let compilation_options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
         let color = color_format(Mode::Planes);
@@ -136,7 +143,7 @@ impl PlaneView {
 fn rectangles_seen_along(technique: &OccluderPlanes, forward: Vec3) -> Vec<Rectangle> {
     let (set, slots) = technique.planes();
     let rectangle =
-        |(i, (baked, slot)): (usize, (&BakedPlane, &Slot))| Rectangle::new(&baked.plane, slot, plane_color_linear(i));
+        |(i, (baked, slot)): (usize, (&BakedPlane, &Slot))| Rectangle::new(baked, slot, plane_color_linear(i));
     let mut rectangles: Vec<_> = set.planes.iter().zip(slots).enumerate().map(rectangle).collect();
     rectangles.sort_by(|p, q| q.centre().dot(forward).total_cmp(&p.centre().dot(forward)));
     rectangles

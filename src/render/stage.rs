@@ -103,7 +103,7 @@ impl Layouts {
         let image = bindings::texture(wgpu::TextureViewDimension::D2);
         Self {
             frame: layout(gpu, "frame", &[(both, UNIFORM), (both, STORAGE)]),
-            material: layout(gpu, "material", &[(fragment, STORAGE), (fragment, image), (fragment, SAMPLER)]),
+            material: layout(gpu, "material", &[(both, STORAGE), (fragment, image), (fragment, SAMPLER)]),
         }
     }
 }
@@ -174,6 +174,15 @@ impl Stage {
     #[must_use]
     pub fn has_transparent(&self) -> bool {
         self.model.batches.iter().any(|batch| batch.transparent)
+    }
+
+    /// Draw calls over some of the casters' sections.
+    pub(crate) fn calls_over(&self, wanted: &dyn Fn(u32) -> bool) -> usize {
+        let runs: usize = self.model.batches.iter().map(|batch| batch.runs(wanted).len()).sum();
+        match self.draw_calls {
+            DrawCalls::Instanced => runs,
+            DrawCalls::OnePerInstance => runs * self.placements.len(),
+        }
     }
 
     /// Draws a frame with what `technique` prepares for its light. Alpha is 255 everywhere but on the background of
@@ -250,14 +259,28 @@ impl Stage {
         part: Part,
         pipeline: impl Fn(&Batch) -> &'p wgpu::RenderPipeline,
     ) {
+        self.draw_sections(pass, (part, &|_| true), pipeline);
+    }
+
+    /// The same of the sections that are wanted, by their labels.
+    pub(crate) fn draw_sections<'p>(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        (part, wanted): (Part, &dyn Fn(u32) -> bool),
+        pipeline: impl Fn(&Batch) -> &'p wgpu::RenderPipeline,
+    ) {
+        let count = self.placements.len() as u32;
         for batch in self.model.batches.iter().filter(|batch| part.holds(batch)) {
+            let runs = batch.runs(wanted);
+            if runs.is_empty() {
+                continue;
+            }
             pass.set_pipeline(pipeline(batch));
             pass.set_bind_group(1, &batch.bind_group, &[]);
-            let count = self.placements.len() as u32;
-            match self.draw_calls {
-                DrawCalls::Instanced => pass.draw(batch.vertices.clone(), 0..count),
-                DrawCalls::OnePerInstance => {
-                    (0..count).for_each(|i| pass.draw(batch.vertices.clone(), i..i + 1));
+            for vertices in runs {
+                match self.draw_calls {
+                    DrawCalls::Instanced => pass.draw(vertices, 0..count),
+                    DrawCalls::OnePerInstance => (0..count).for_each(|i| pass.draw(vertices.clone(), i..i + 1)),
                 }
             }
         }

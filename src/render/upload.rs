@@ -47,14 +47,28 @@ pub struct Batch {
     pub has_holes: bool,
     /// Group 1 of the forward pass.
     pub bind_group: wgpu::BindGroup,
-    /// In [`Model::vertices`].
-    pub vertices: Range<u32>,
+    /// In [`Model::vertices`], section by section: its label and its triangles' corners.
+    sections: Vec<(u32, Range<u32>)>,
+}
+
+impl Batch {
+    /// The vertices of the sections that `wanted` picks by their labels, in as few runs as there can be.
+    pub fn runs(&self, wanted: impl Fn(u32) -> bool) -> Vec<Range<u32>> {
+        let mut runs: Vec<Range<u32>> = Vec::new();
+        for (_, vertices) in self.sections.iter().filter(|(section, _)| wanted(*section)) {
+            match runs.last_mut() {
+                Some(last) if last.end == vertices.start => last.end = vertices.end,
+                _ => runs.push(vertices.clone()),
+            }
+        }
+        runs
+    }
 }
 
 /// A scene on the device.
 #[derive(Clone, Debug)]
 pub struct Model {
-    /// All triangles, unindexed, sorted by batch.
+    /// All triangles, unindexed, sorted by batch and section.
     pub vertices: wgpu::Buffer,
     /// Draws.
     pub batches: Vec<Batch>,
@@ -66,8 +80,8 @@ pub struct Model {
 }
 
 impl Model {
-    /// Uploads `scene` in the unit space of `frame`. Triangles keep their order within a batch, so that of two
-    /// equal ones the first wins the depth test, as it does in the BVH.
+    /// Uploads `scene` in the unit space of `frame`. Triangles keep their order within a batch's section, so that of
+    /// two equal ones the first wins the depth test, as it does in the BVH.
     pub fn upload(
         gpu: &Gpu,
         material: &wgpu::BindGroupLayout,
@@ -90,7 +104,7 @@ impl Model {
         let materials = upload_materials(gpu, scene);
         let mut images = BTreeMap::new();
         let mut batches = Vec::new();
-        for (look, range) in looks {
+        for (look, sections) in looks {
             let view = match images.entry(look.image) {
                 std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
                 std::collections::btree_map::Entry::Vacant(entry) => {
@@ -99,14 +113,14 @@ impl Model {
             };
             let bind_group = bind(gpu, material, &materials, view, look.repeat);
             let Look { ground, transparent, double_sided, has_holes, .. } = look;
-            batches.push(Batch { ground, transparent, double_sided, has_holes, bind_group, vertices: range });
+            batches.push(Batch { ground, transparent, double_sided, has_holes, bind_group, sections });
         }
         Ok(Self { vertices, batches, extremes, bounds })
     }
 }
 
 /// The vertices in the order of [`Model::vertices`], three a triangle, in the unit space of `frame`, and what they draw.
-pub fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Range<u32>)>) {
+pub fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Vec<(u32, Range<u32>)>)>) {
     let mut triangles_of: BTreeMap<Look, Vec<usize>> = BTreeMap::new();
     for (triangle, &material) in scene.material_of.iter().enumerate() {
         let material = &scene.materials[material as usize];
@@ -128,17 +142,23 @@ pub fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Range<
     }
     let mut vertices = Vec::with_capacity(3 * scene.material_of.len());
     let mut looks = Vec::with_capacity(triangles_of.len());
-    for (look, triangles) in triangles_of {
-        let first = vertices.len() as u32;
-        vertices.extend(triangles.into_iter().flat_map(|triangle| triangle_vertices(scene, frame, triangle)));
-        looks.push((look, first..vertices.len() as u32));
+    for (look, mut triangles) in triangles_of {
+        triangles.sort_by_key(|&triangle| scene.section_of[triangle]);
+        let mut sections = Vec::new();
+        for triangles in triangles.chunk_by(|&a, &b| scene.section_of[a] == scene.section_of[b]) {
+            let first = vertices.len() as u32;
+            vertices.extend(triangles.iter().flat_map(|&triangle| triangle_vertices(scene, frame, triangle)));
+            sections.push((scene.section_of[triangles[0]], first..vertices.len() as u32));
+        }
+        looks.push((look, sections));
     }
     (vertices, looks)
 }
 
-fn extremes(vertices: &[Vertex], looks: &[(Look, Range<u32>)]) -> Vec<Vec3> {
+fn extremes(vertices: &[Vertex], looks: &[(Look, Vec<(u32, Range<u32>)>)]) -> Vec<Vec3> {
     let casters = looks.iter().filter(|(look, _)| !look.ground);
     let corners: Vec<Vec3> = casters
+        .flat_map(|(_, sections)| sections)
         .flat_map(|(_, range)| &vertices[range.start as usize..range.end as usize])
         .map(|vertex| vertex.p)
         .collect();

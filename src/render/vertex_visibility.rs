@@ -110,7 +110,8 @@ impl VertexVisibility {
 fn sides(scene: &Scene, mesh: &Mesh) -> (Vec<VertexSide>, Vec<[u32; 2]>) {
     let (vertices, looks) = vertices(scene, &mesh.frame);
     let (mut sides, mut numbers) = (Vec::new(), Vec::with_capacity(vertices.len()));
-    for (look, range) in looks {
+    for (look, range) in looks.iter().flat_map(|(look, sections)| sections.iter().map(move |(_, range)| (look, range)))
+    {
         for Vertex { p, shading_normal, .. } in &vertices[range.start as usize..range.end as usize] {
             let front = sides.len() as u32;
             sides.push(VertexSide { p: *p, normal: *shading_normal });
