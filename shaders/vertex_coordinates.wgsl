@@ -1,7 +1,7 @@
 // Pass: the model with shadow planes whose coordinates are interpolated from the vertices. Under a directional light they
 // are affine in the receiver, so that is exact; edges are hard.
 
-// Most planes of a list; vertex_coordinates of Rust refuses longer ones.
+// Most planes of a list; MOST_AT_VERTICES of occluder_planes.rs.
 const MOST: u32 = 4;
 
 struct Shadowed {
@@ -29,22 +29,28 @@ fn vs_coordinates(vertex: Vertex, @builtin(instance_index) instance: u32) -> Sha
     let surface = surface_of(vertex, instance);
     let list = list_of(instance, vertex.section);
     let p1 = vec4f(vertex.p, 1.0);
-    var coordinates: array<vec3f, MOST>;
-    var slots: array<vec3u, MOST>;
+    var out: Shadowed;
+    out.clip = surface.clip;
+    out.p = surface.p;
+    out.geometric_normal = surface.geometric_normal;
+    out.shading_normal = surface.shading_normal;
+    out.uv = surface.uv;
     var count = 0u;
+    // The newest plane comes first, and the others move on: an index that differs by lane is slow in software.
     for (var i = list.x; i < list.y && count < MOST; i += PLANE_TEXELS) {
-        let slot = casting_texel(i + 3u);
         let plane = casting_plane(i);
-        coordinates[count] = vec3f(dot(plane.a, p1), dot(plane.b, p1), dot(plane.s, p1) - plane.bias);
-        slots[count] = slot.xyz;
+        out.coordinates_3 = out.coordinates_2;
+        out.coordinates_2 = out.coordinates_1;
+        out.coordinates_1 = out.coordinates_0;
+        out.coordinates_0 = vec3f(dot(plane.a, p1), dot(plane.b, p1), dot(plane.s, p1) - plane.bias);
+        out.slot_3 = out.slot_2;
+        out.slot_2 = out.slot_1;
+        out.slot_1 = out.slot_0;
+        out.slot_0 = casting_texel(i + 3u).xyz;
         count++;
     }
-    return Shadowed(
-        surface.clip, surface.p, surface.geometric_normal, surface.shading_normal, surface.uv,
-        vec3u(surface.material, instance, count),
-        coordinates[0], coordinates[1], coordinates[2], coordinates[3],
-        slots[0], slots[1], slots[2], slots[3],
-    );
+    out.numbers = vec3u(surface.material, instance, count);
+    return out;
 }
 
 fn surface_of_shadowed(shadowed: Shadowed) -> Surface {
@@ -56,13 +62,19 @@ fn surface_of_shadowed(shadowed: Shadowed) -> Surface {
 
 // As `visibility` of planes.wgsl.
 fn visibility_of(shadowed: Shadowed) -> f32 {
-    let coordinates = array(shadowed.coordinates_0, shadowed.coordinates_1, shadowed.coordinates_2, shadowed.coordinates_3);
-    let slots = array(shadowed.slot_0, shadowed.slot_1, shadowed.slot_2, shadowed.slot_3);
+    var rest = shadowed;
     var v = 1.0;
     for (var i = 0u; i < shadowed.numbers.z && v > 0.0; i++) {
-        if coordinates[i].z > 0.0 && on_rectangle(coordinates[i].xy) {
-            v *= 1.0 - sample(slot_of(vec4u(slots[i], 0u)), coordinates[i].xy);
+        let c = rest.coordinates_0;
+        if c.z > 0.0 && on_rectangle(c.xy) {
+            v *= 1.0 - sample(slot_of(vec4u(rest.slot_0, 0u)), c.xy);
         }
+        rest.coordinates_0 = rest.coordinates_1;
+        rest.coordinates_1 = rest.coordinates_2;
+        rest.coordinates_2 = rest.coordinates_3;
+        rest.slot_0 = rest.slot_1;
+        rest.slot_1 = rest.slot_2;
+        rest.slot_2 = rest.slot_3;
     }
     return v;
 }

@@ -39,6 +39,9 @@ pub struct SlotTexel {
 }
 
 impl SlotTexel {
+    /// Layers that its 11 bits can tell apart.
+    pub const LAYERS: u32 = 1 << 11;
+
     /// Of a plane whose texture lies in `slot`; edges do not soften.
     pub fn new(baked: &BakedPlane, slot: &Slot) -> Self {
         let ([x, y], [w, h]) = (slot.corner, slot.size);

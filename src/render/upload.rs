@@ -34,6 +34,9 @@ pub struct Look {
 /// Directions in which a model's extreme corners are sought.
 const EXTREME_DIRECTIONS: usize = 512;
 
+/// The vertices of each section, by its label.
+type Sections = Vec<(u32, Range<u32>)>;
+
 /// One draw.
 #[derive(Clone, Debug)]
 pub struct Batch {
@@ -48,7 +51,7 @@ pub struct Batch {
     /// Group 1 of the forward pass.
     pub bind_group: wgpu::BindGroup,
     /// In [`Model::vertices`], section by section: its label and its triangles' corners.
-    sections: Vec<(u32, Range<u32>)>,
+    sections: Sections,
 }
 
 impl Batch {
@@ -120,7 +123,7 @@ impl Model {
 }
 
 /// The vertices in the order of [`Model::vertices`], three a triangle, in the unit space of `frame`, and what they draw.
-pub fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Vec<(u32, Range<u32>)>)>) {
+pub fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Sections)>) {
     let mut triangles_of: BTreeMap<Look, Vec<usize>> = BTreeMap::new();
     for (triangle, &material) in scene.material_of.iter().enumerate() {
         let material = &scene.materials[material as usize];
@@ -155,7 +158,7 @@ pub fn vertices(scene: &Scene, frame: &Frame) -> (Vec<Vertex>, Vec<(Look, Vec<(u
     (vertices, looks)
 }
 
-fn extremes(vertices: &[Vertex], looks: &[(Look, Vec<(u32, Range<u32>)>)]) -> Vec<Vec3> {
+fn extremes(vertices: &[Vertex], looks: &[(Look, Sections)]) -> Vec<Vec3> {
     let casters = looks.iter().filter(|(look, _)| !look.ground);
     let corners: Vec<Vec3> = casters
         .flat_map(|(_, sections)| sections)
