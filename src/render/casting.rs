@@ -176,7 +176,8 @@ impl Prepared {
 
 /// All lists that a light may choose.
 pub(crate) fn choices(set: &BakedSet) -> impl Iterator<Item = &SectionLists> {
-    set.active.iter().flat_map(|active| &active.lists).chain([&set.sections])
+    let active = set.active.as_ref().filter(|active| !active.lists.is_empty());
+    active.map_or(std::slice::from_ref(&set.sections), |active| &active.lists).iter()
 }
 
 /// Planes in all lists of a set, under the light where there are most.

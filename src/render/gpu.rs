@@ -117,6 +117,7 @@ pub struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     adapter_name: String,
+    is_software: bool,
     failure: Arc<Mutex<Option<String>>>,
 }
 
@@ -169,13 +170,20 @@ impl Gpu {
             first.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error.to_string());
         }));
         let info = adapter.get_info();
-        Ok(Self { device, queue, adapter_name: format!("{} ({})", info.name, info.backend), failure })
+        let is_software = info.device_type == wgpu::DeviceType::Cpu;
+        let adapter_name = format!("{} ({})", info.name, info.backend);
+        Ok(Self { device, queue, adapter_name, is_software, failure })
     }
 
     /// Name of the adapter and its interface, for reports: `llvmpipe (LLVM 15.0.6, 256 bits) (vulkan)`.
     #[must_use]
     pub fn adapter_name(&self) -> &str {
         &self.adapter_name
+    }
+
+    /// Are shaders run by the CPU?
+    pub(crate) fn is_software(&self) -> bool {
+        self.is_software
     }
 
     pub(crate) fn limits(&self) -> wgpu::Limits {

@@ -19,8 +19,9 @@
 //!
 //! Why, from samples and the disassembly of the compiled shaders:
 //! - An `if` masks lanes and jumps over nothing; a loop looks whether lanes are left only at its end. A fragment whose
-//!   list is empty paid for one plane: `none` 18.7 ms, all lists empty 29.0 ms, the true lists 31.8 ms. So sections that
-//!   read no plane in any instance are drawn by the pipeline without (60 draws instead of one): empty lists cost 1.00.
+//!   list is empty paid for one plane: `none` 18.7 ms, all lists empty 29.0 ms, the true lists 31.8 ms. So where
+//!   the adapter is software, sections that read no plane in any instance are drawn by the pipeline without (60 draws
+//!   instead of one): empty lists cost 1.00.
 //! - A load from a storage buffer is a loop over the lanes, about a hundred instructions a number and 25 numbers a plane. A
 //!   texel of 128 bits is 148 instructions for 8 lanes and four numbers: planes are texels. 1.64 became 1.50.
 //! - Every fragment of every technique looked for holes (four loads, one texel): a pipeline constant now leaves that out
@@ -232,10 +233,10 @@ impl Technique for OccluderPlanes {
             return Ok(());
         }
         let mut pass = targets.begin(encoder, (request.options.mode, Begin::Clear));
-        let casting = &self.casting;
-        self.bare.draw_sections(stage, request, targets, (&mut pass, Part::All, &|label| !casting.is_asked(label)));
+        let is_asked = |label| is_asked(stage, &self.casting, label);
+        self.bare.draw_sections(stage, request, targets, (&mut pass, Part::All, &|label| !is_asked(label)));
         pass.set_bind_group(2, &self.group, &[]);
-        self.forward.draw_sections(stage, request, targets, (&mut pass, Part::All, &|label| casting.is_asked(label)));
+        self.forward.draw_sections(stage, request, targets, (&mut pass, Part::All, &is_asked));
         Ok(())
     }
 
@@ -243,7 +244,7 @@ impl Technique for OccluderPlanes {
         Cost {
             passes: 1,
             draw_calls: [true, false]
-                .map(|asked| stage.calls_over(&|label| self.casting.is_asked(label) == asked))
+                .map(|asked| stage.calls_over(&|label| is_asked(stage, &self.casting, label) == asked))
                 .iter()
                 .sum(),
             update_passes: 0,
@@ -253,6 +254,12 @@ impl Technique for OccluderPlanes {
             on_light_change: "three rows a casting plane and the sections' lists, per instance, on the CPU".to_string(),
         }
     }
+}
+
+/// Does the pipeline with planes draw that section? On graphics hardware all of them, by one call: it jumps over empty
+/// lists.
+fn is_asked(stage: &Stage, casting: &Casting, label: u32) -> bool {
+    !stage.gpu.is_software() || casting.is_asked(label)
 }
 
 /// The pipeline constants of planes.wgsl that are constants of the solver.
