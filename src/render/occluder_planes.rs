@@ -5,17 +5,19 @@
 //! of them, so it costs no fragment anything. Under a directional light of some size edges are soft where textures are
 //! distance fields; for a light without size nothing is asked, so that hard edges pay nothing.
 //!
-//! What it costs on lavapipe (Mesa 22.3, LLVM 15, 8 lanes), times `none`, CPU time of 40 to 64 interleaved frames of
-//! 1024 x 1024, median of the ratios (mean), teapot in 144 sections, 774 planes, lists of at most 4, 0.67 on average:
+//! What it costs on lavapipe (Mesa 22.3, LLVM 15, 8 lanes) against `none`: CPU time of interleaved frames of 1024 x 1024
+//! (40 of one instance, 24 filling the frame, 5 to 9 of 100), median of the ratios, light still / moving; the teapot in
+//! 144 sections, 774 planes, lists of at most 4 and 0.67 on average:
 //!
-//! | technique | one instance, light still | moving | 100 instances, still | moving |
+//! | technique | turntable | one, filling the frame | 100 instances | 100, vertices alone |
 //! |---|---|---|---|---|
-//! | coordinates per fragment | 1.30 (1.40) | 1.31 | 1.32 (1.22) | 1.25 |
-//! | coordinates per vertex | 1.24 (1.26) | 1.26 | 1.61 (1.53) | 1.63 |
-//! | shadow map 512, nearest | 1.44 (1.44) | 1.83 | 1.14 (1.16) | 1.80 |
+//! | coordinates per fragment | 1.30 / 1.31 | 1.58 / 1.62 | 1.32 / 1.25 | 0.97 / 0.97 |
+//! | coordinates per vertex | 1.24 / 1.26 | 1.28 / 1.25 | 1.61 / 1.63 | 1.38 / 1.41 |
+//! | shadow map 512, nearest | 1.44 / 1.83 | 1.56 / 1.70 | 1.14 / 1.80 | 1.06 / 1.70 |
 //!
-//! Per vertex wins where fragments are many and loses where vertices are (as the thesis found): the vertex stage is 47 %
-//! of the shader time of `none` at 100 instances.
+//! The machine was shared: the same cell differs by up to 0.1 between runs. Per vertex wins where fragments are many and
+//! loses where vertices are (as the thesis found): the vertex stage is 47 % of the shader time of `none` at 100
+//! instances.
 //!
 //! Why, from samples and the disassembly of the compiled shaders:
 //! - An `if` masks lanes and jumps over nothing; a loop looks whether lanes are left only at its end. A fragment whose
