@@ -23,15 +23,16 @@
 //! - An `if` masks lanes and jumps over nothing; a loop looks whether lanes are left only at its end. A fragment whose
 //!   list is empty paid for one plane: `none` 18.7 ms, all lists empty 29.0 ms, the true lists 31.8 ms. So sections that
 //!   read no plane in any instance are drawn by the pipeline without (60 draws instead of one): empty lists cost 1.00.
-//! - A load from a storage buffer is a loop over the lanes, about a hundred instructions a number and 25 numbers a plane. A
-//!   texel of 128 bits is 148 instructions for 8 lanes and four numbers: planes are texels. 1.64 became 1.50.
+//! - A load from a storage buffer is a loop over the lanes: some hundred executed instructions a number (counted by hand:
+//!   8 turns of 12), 25 numbers a plane. A texel is 148 instructions for four numbers of 8 lanes: planes are texels. 1.64
+//!   became 1.50.
 //! - Every fragment of every technique looked for holes (four loads, one texel): a pipeline constant now leaves that out
 //!   where no image cuts any; `none` took 0.86 of its time.
-//! - An array that is indexed by a loop's counter is gathered lane by lane: the coordinates of vertices move through
-//!   variables instead; with arrays the variant cost 1.54 (1.64).
+//! - The coordinates of vertices move through variables: as arrays indexed by the loop's counter, which each lane counts
+//!   for itself, they cost 1.54 on the turntable.
 //!
-//! Rejected: the light and the base colour as flat attributes of vertices: `none` 0.71 of its time for one instance but
-//! 1.14 at 100, since the vertex stage then gathers six numbers more.
+//! Rejected: the light and the base colour as flat attributes of vertices: `none` 0.84 of its time for one instance but
+//! 1.14 at 100 (4 frames), since the vertex stage then gathers six numbers more.
 
 use super::{
     FrameRequest, Light, Mode, RenderError,
