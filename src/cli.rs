@@ -1,22 +1,17 @@
 //! The command line: raw arguments, checked into requests, run, and answered with an exit code.
 
+mod compare;
+mod render;
+
 use crate::{
     ablation,
-    asset::{self, AssetError},
-    comparison::{self, CompareOptions, Family},
     effort::Effort,
     pipeline::{self, FitError, FitRequest},
-    render::{Antialias, Camera, FrameOptions, FrameRequest, Light, Mode, RenderError, cpu, gpu::Gpu, turntable},
-    scene,
     validation::ValidationOptions,
 };
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use shadowfit_solver::{
-    columns::ColumnOptions,
-    lights::{LightDomain, direction},
-    mesh::Mesh,
-};
+use shadowfit_solver::{columns::ColumnOptions, lights::LightDomain};
 use std::{io::IsTerminal, path::PathBuf, time::Duration};
 
 /// Finds shadow planes through a 3D model and bakes occluder textures on them: self-shadows for any light in one
@@ -33,12 +28,12 @@ enum Command {
     /// Fit shadow planes to a model (.glb or .gltf) and write the asset, its report and a comparison picture.
     Fit(FitArgs),
     /// Draw a fitted asset to a PNG.
-    Render(RenderArgs),
+    Render(render::RenderArgs),
     /// Measure error against planes: of the method, of it with each part switched off, of published baselines, and of
     /// shadow maps.
     Ablate(AblateArgs),
     /// Compare shadow planes with the other techniques of the field in one renderer: error, frame time, memory, scaling.
-    Compare(CompareArgs),
+    Compare(compare::CompareArgs),
 }
 
 #[derive(Debug, Args)]
@@ -127,41 +122,6 @@ struct AblateArgs {
     method: MethodArgs,
 }
 
-#[derive(Debug, Args)]
-struct CompareArgs {
-    /// The models: .glb or .gltf. One without planes is fitted first, with 8 planes and divided.
-    #[arg(required = true, value_name = "MODEL")]
-    models: Vec<PathBuf>,
-    /// Folder of the tables, the charts and the pictures; made where it is missing.
-    #[arg(short, long, value_name = "DIR")]
-    out: PathBuf,
-    /// Techniques [default: all].
-    #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
-    techniques: Vec<Family>,
-    /// Light directions.
-    #[arg(long = "lights", value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=64))]
-    lights: u16,
-    /// Views around the model.
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=64))]
-    views: u16,
-    /// Width and height of the frames in pixels.
-    #[arg(long, value_name = "PX", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(64..=4096))]
-    size: u32,
-    /// Frames of each technique that are timed.
-    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..=1000))]
-    frames: u16,
-    /// Instances of the model in the scaling tests; 0: no such tests.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1,10,100,200",
-          value_parser = clap::value_parser!(u16).range(0..=2000))]
-    instances: Vec<u16>,
-    /// How much work the fits do.
-    #[arg(long, value_enum, default_value_t = Preset::Balanced)]
-    preset: Preset,
-    /// Seed of all sampling.
-    #[arg(long, value_name = "S", default_value_t = 1)]
-    seed: u64,
-}
-
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Preset {
     Fast,
@@ -174,37 +134,6 @@ enum Validate {
     None,
     Short,
     Full,
-}
-
-#[derive(Debug, Args)]
-struct RenderArgs {
-    /// The asset: STEM.shadow.glb.
-    asset: PathBuf,
-    /// The picture to write.
-    #[arg(short, long, value_name = "PNG")]
-    out: PathBuf,
-    /// Where the light is, seen from the model: azimuth (0 = +Z, 90 = +X) and elevation, degrees.
-    #[arg(long, value_name = "AZ,EL", default_value = "35,40", value_parser = angles, allow_hyphen_values = true)]
-    light: [f32; 2],
-    /// Angular radius of the light, degrees: soft edges, 0 for hard ones. The sun has 0.27.
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = radius)]
-    light_radius: f32,
-    /// Where the camera is, seen from the model: azimuth and elevation, degrees.
-    #[arg(long, value_name = "AZ,EL", default_value = "30,20", value_parser = angles, allow_hyphen_values = true)]
-    view: [f32; 2],
-    /// Width and height in pixels.
-    #[arg(long, value_name = "PX", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(16..=8192))]
-    size: u32,
-    /// What to draw: the shaded model, the raw visibility, or the model with its planes.
-    #[arg(long, value_enum, default_value_t = Picture::Shaded)]
-    mode: Picture,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Picture {
-    Shaded,
-    Mask,
-    Planes,
 }
 
 /// Why a command failed.
@@ -259,28 +188,6 @@ fn bytes(text: &str) -> Result<usize, String> {
     number.ok_or_else(|| "a number of bytes is needed, or one with K or M".to_string())
 }
 
-/// `AZ,EL` in degrees, as radians.
-fn angles(text: &str) -> Result<[f32; 2], String> {
-    let numbers: Vec<f32> = text.split(',').filter_map(|n| n.trim().parse().ok()).collect();
-    match numbers[..] {
-        [az, el] if text.split(',').count() == 2 && az.is_finite() && el.abs() <= 90.0 => {
-            Ok([az.to_radians(), el.to_radians()])
-        }
-        _ => Err("AZIMUTH,ELEVATION in degrees is needed, elevation from -90 to 90".to_string()),
-    }
-}
-
-/// Most degrees of a light's radius: beyond, no border is left that could be soft.
-const MAX_LIGHT_RADIUS_DEG: f32 = 45.0;
-
-/// Degrees from 0 to [`MAX_LIGHT_RADIUS_DEG`].
-fn radius(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(degrees) if (0.0..=MAX_LIGHT_RADIUS_DEG).contains(&degrees) => Ok(degrees),
-        _ => Err(format!("degrees from 0 to {MAX_LIGHT_RADIUS_DEG} are needed")),
-    }
-}
-
 /// Runs a parsed command line; `command` is its text, for the report.
 ///
 /// # Errors
@@ -288,9 +195,9 @@ fn radius(text: &str) -> Result<f32, String> {
 pub fn run(cli: Cli, command: String) -> Result<(), CliError> {
     match cli.command {
         Command::Fit(args) => fit(args, command),
-        Command::Render(args) => render(&args),
+        Command::Render(args) => render::render(&args),
         Command::Ablate(args) => ablate(args, command),
-        Command::Compare(args) => compare(&args, &command),
+        Command::Compare(args) => compare::compare(&args, &command),
     }
 }
 
@@ -390,49 +297,6 @@ fn ablate(args: AblateArgs, command: String) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Compares the techniques on each model and prints the tables.
-fn compare(args: &CompareArgs, command: &str) -> Result<(), CliError> {
-    let mut families =
-        if args.techniques.is_empty() { Family::value_variants().to_vec() } else { args.techniques.clone() };
-    families.push(Family::None);
-    families.sort();
-    families.dedup();
-    let options = CompareOptions {
-        families,
-        lights: usize::from(args.lights),
-        views: usize::from(args.views),
-        size_px: args.size,
-        frames: usize::from(args.frames),
-        instances: args.instances.iter().map(|&n| usize::from(n)).filter(|&n| n > 0).collect(),
-    };
-    for model in &args.models {
-        let request = FitRequest {
-            model: model.clone(),
-            out_dir: args.out.clone(),
-            effort: args.preset.effort(),
-            max_planes: None,
-            max_lookups: None,
-            sections: None,
-            texture_budget: None,
-            certificate: None,
-            max_error: None,
-            texture_size: None,
-            domain: LightDomain::Sphere,
-            domain_text: "sphere".to_string(),
-            planes: None,
-            ground: false,
-            validation: None,
-            seed: args.seed,
-            command: command.to_string(),
-        };
-        let bar = progress_bar();
-        let outcome = comparison::run(&request, &options, &mut |message| bar.set_message(message));
-        bar.finish_and_clear();
-        print!("{}", outcome?.markdown());
-    }
-    Ok(())
-}
-
 /// A spinner on a terminal, nothing elsewhere.
 fn progress_bar() -> ProgressBar {
     if !std::io::stderr().is_terminal() {
@@ -444,41 +308,4 @@ fn progress_bar() -> ProgressBar {
     }
     bar.enable_steady_tick(Duration::from_millis(120));
     bar
-}
-
-/// Draws an asset: with wgpu, or with the CPU twin where there is no adapter.
-fn render(args: &RenderArgs) -> Result<(), CliError> {
-    if asset::files::is_same_file(&args.asset, &args.out) {
-        return Err(FitError::Asset(AssetError::OverwritesInput { path: args.out.clone() }).into());
-    }
-    let scene = scene::load(&args.asset).map_err(FitError::Scene)?;
-    let mesh = Mesh::new(&scene.soup).map_err(|source| FitError::Mesh { path: args.asset.clone(), source })?;
-    let set = asset::read(&args.asset).map_err(FitError::Asset)?.in_unit_space(&mesh.frame);
-    let (mode, antialias) = match args.mode {
-        Picture::Shaded => (Mode::Shaded, Antialias::Msaa4),
-        Picture::Mask => (Mode::Mask, Antialias::Off),
-        Picture::Planes => (Mode::Planes, Antialias::Msaa4),
-    };
-    let request = FrameRequest {
-        camera: Camera::turntable(args.view[0], args.view[1]),
-        light: Light::Directional { to_light: direction(args.light[0], args.light[1]) },
-        options: FrameOptions { size_px: [args.size; 2], mode, antialias },
-    };
-    let light_radius_rad = args.light_radius.to_radians();
-    let on_gpu = || {
-        let mut turntable = turntable::Turntable::new(&Gpu::new()?, &scene, &mesh.frame)?;
-        turntable.set_soft_planes(&set, light_radius_rad)?;
-        turntable.render(&request)
-    };
-    let picture = match on_gpu() {
-        Err(RenderError::NoAdapter | RenderError::Device { .. } | RenderError::TooLarge { .. }) => {
-            tracing::warn!("no graphics adapter can draw this: drawing with the CPU");
-            let mut turntable = cpu::Turntable::new(&scene, &mesh);
-            turntable.set_soft_planes(&set, light_radius_rad);
-            turntable.render(&request)
-        }
-        outcome => outcome,
-    };
-    pipeline::write_png(&args.out, &picture.map_err(FitError::Render)?)?;
-    Ok(())
 }

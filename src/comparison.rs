@@ -38,7 +38,7 @@ pub struct CompareOptions {
     pub views: usize,
     /// Width and height of the frames.
     pub size_px: u32,
-    /// Frames timed of each technique, after as many as [`speed::WARM_UP`].
+    /// Frames timed of each technique, after two that do not count.
     pub frames: usize,
     /// Instances of the model in the scaling test; empty: no such test.
     pub instances: Vec<usize>,

@@ -26,7 +26,10 @@ use crate::{
     scene::Scene,
 };
 use glam::Vec3;
-use shadowfit_solver::mesh::{Frame, Mesh};
+use shadowfit_solver::{
+    mesh::{Frame, Mesh},
+    plane::BakedSet,
+};
 
 /// A technique, whatever its setting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum, serde::Serialize)]
@@ -240,14 +243,21 @@ impl Family {
             _ => Against::Hard,
         }
     }
+}
 
-    /// Radii of the light that its planes are told; none where it has no planes.
-    fn plane_radii_rad(self) -> &'static [f32] {
-        match self {
-            Self::Planes => &SOFT_RADII_RAD[..1],
-            Self::SoftEdge => &SOFT_RADII_RAD,
-            _ => &[],
+/// The ways to draw a set of planes: hard with coordinates of fragments and of vertices (where no list is too long for
+/// that), or without and with soft edges.
+fn variants(family: Family, (stage, set): (&Stage, &BakedSet)) -> Result<Vec<OccluderPlanes>, RenderError> {
+    match family {
+        Family::Planes => {
+            let per_vertex = match OccluderPlanes::per_vertex(stage, set) {
+                Err(RenderError::Unsupported { .. }) => None,
+                outcome => Some(outcome?),
+            };
+            Ok([OccluderPlanes::new(stage, set)?].into_iter().chain(per_vertex).collect())
         }
+        Family::SoftEdge => SOFT_RADII_RAD.map(|radius| OccluderPlanes::soft(stage, set, radius)).into_iter().collect(),
+        _ => Ok(Vec::new()),
     }
 }
 
@@ -263,14 +273,14 @@ pub(super) fn settings(bench: &Bench, options: &CompareOptions) -> Result<Vec<Se
         let soft = (family == Family::SoftEdge).then_some("soft edge");
         let setting = |technique| Setting { family, world, against, technique, label: soft.map(str::to_string) };
         settings.extend(subject.techniques(family)?.into_iter().map(setting));
-        for &radius_rad in family.plane_radii_rad() {
-            for (set, planes) in bench.planes.iter().enumerate() {
-                for world in [World::Planes(set), World::PlanesOnGround(set)] {
-                    let Some(stage) = bench.stage(world) else { continue };
-                    let technique = Box::new(OccluderPlanes::soft(stage, &planes.set, radius_rad)?);
-                    let on_ground = world.counts_ground().then_some("on the ground");
-                    let words: Vec<&str> = std::iter::once(&*planes.label).chain(soft).chain(on_ground).collect();
-                    settings.push(Setting { family, world, against, technique, label: Some(words.join(", ")) });
+        for (set, planes) in bench.planes.iter().enumerate() {
+            for world in [World::Planes(set), World::PlanesOnGround(set)] {
+                let Some(stage) = bench.stage(world) else { continue };
+                let on_ground = world.counts_ground().then_some("on the ground");
+                let words: Vec<&str> = std::iter::once(&*planes.label).chain(soft).chain(on_ground).collect();
+                for technique in variants(family, (stage, &planes.set))? {
+                    let label = Some(words.join(", "));
+                    settings.push(Setting { family, world, against, technique: Box::new(technique), label });
                 }
             }
         }

@@ -8,6 +8,7 @@ use super::{
     CompareOptions,
     bench::{Bench, Planes, World},
     catalogue::{Family, Subject},
+    speed::WARM_UP,
 };
 use crate::{
     pipeline::FitError,
@@ -22,12 +23,18 @@ use crate::{
 };
 use glam::Vec3;
 use serde::Serialize;
+use std::time::Instant;
 
 /// Seed of the instances.
 pub(super) const FIELD_SEED: u64 = 1;
 
 /// Most instances where fragments bind: each of them covers the whole frame.
 const FILL_INSTANCES: usize = 10;
+
+/// A test ends before all frames are drawn where it has taken this long for each technique, seconds, and has drawn
+/// [`LEAST_FRAMES`]: hundreds of instances take seconds a frame where a CPU draws them.
+const SECONDS: f64 = 15.0;
+const LEAST_FRAMES: usize = 10;
 
 /// What a test makes scarce.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -56,6 +63,8 @@ pub struct ScalingRow {
     pub frame: f64,
     /// The CPU's part against the same.
     pub cpu: f64,
+    /// Frames timed.
+    pub frames: usize,
     /// Frame time of `none` against its time with one instance in the plain test.
     pub floor: f64,
 }
@@ -150,7 +159,12 @@ fn test(
     let timer = Timer::new(&bench.gpu);
     let mut techniques = techniques(bench, &stages, options)?;
     let mut samples = vec![(Vec::new(), Vec::new()); techniques.len()];
-    for frame in 0..super::speed::WARM_UP + options.frames {
+    let start = Instant::now();
+    for frame in 0..WARM_UP + options.frames {
+        let is_over = start.elapsed().as_secs_f64() > SECONDS * techniques.len() as f64;
+        if is_over && frame >= WARM_UP + LEAST_FRAMES {
+            break;
+        }
         progress(format!("{instances} instances, {bound:?}: frame {} of {}", frame + 1, options.frames));
         for (Scaled { stage, technique, .. }, (frames, cpu)) in techniques.iter_mut().zip(&mut samples) {
             let request = FrameRequest {
@@ -159,12 +173,13 @@ fn test(
                 options: FrameOptions { size_px: [bench.size_px; 2], mode: Mode::Shaded, antialias: Antialias::Off },
             };
             let time = timer.frame((&mut stages[*stage], &mut **technique), &request, Change::Light)?;
-            if frame >= super::speed::WARM_UP {
+            if frame >= WARM_UP {
                 frames.push(time.frame_s);
                 cpu.push(time.cpu_s);
             }
         }
     }
+    let timed = samples.first().map_or(0, |(frames, _)| frames.len());
     let medians: Vec<[f64; 2]> = samples.into_iter().map(|(frames, cpu)| [median(frames), median(cpu)]).collect();
     let floor = medians.first().map_or(f64::MIN_POSITIVE, |none| none[0].max(f64::MIN_POSITIVE));
     let row = |(Scaled { name, .. }, [frame, cpu]): (Scaled, [f64; 2])| ScalingRow {
@@ -173,6 +188,7 @@ fn test(
         instances,
         frame: frame / floor,
         cpu: cpu / floor,
+        frames: timed,
         floor: 1.0,
     };
     Ok((techniques.into_iter().zip(medians).map(row).collect(), floor))

@@ -145,10 +145,10 @@ impl Comparison {
     /// One line a technique and scaling test.
     #[must_use]
     pub fn scaling_csv(&self) -> String {
-        let mut csv = "technique,bound,instances,frame,cpu,floor\n".to_string();
-        for ScalingRow { technique, bound, instances, frame, cpu, floor } in &self.scaling {
+        let mut csv = "technique,bound,instances,frame,cpu,frames,floor\n".to_string();
+        for ScalingRow { technique, bound, instances, frame, cpu, frames, floor } in &self.scaling {
             let bound = bound_name(*bound);
-            let _ = writeln!(csv, "\"{technique}\",{bound},{instances},{frame:.3},{cpu:.4},{floor:.2}");
+            let _ = writeln!(csv, "\"{technique}\",{bound},{instances},{frame:.3},{cpu:.4},{frames},{floor:.2}");
         }
         csv
     }
@@ -186,10 +186,13 @@ impl Comparison {
                 cost.on_light_change,
             );
         }
-        text.push_str("\n| technique | bound by | instances | frame | CPU | none against one instance |\n|---|---|---|---|---|---|\n");
-        for ScalingRow { technique, bound, instances, frame, cpu, floor } in &self.scaling {
+        text.push_str("\n| technique | bound by | instances | frame | CPU | frames | none against one instance |\n|---|---|---|---|---|---|---|\n");
+        for ScalingRow { technique, bound, instances, frame, cpu, frames, floor } in &self.scaling {
             let bound = bound_name(*bound);
-            let _ = writeln!(text, "| {technique} | {bound} | {instances} | {frame:.2} | {cpu:.3} | {floor:.2} |");
+            let _ = writeln!(
+                text,
+                "| {technique} | {bound} | {instances} | {frame:.2} | {cpu:.3} | {frames} | {floor:.2} |"
+            );
         }
         text.push_str("\n| technique | light | instances | mask error | missed + false |\n|---|---|---|---|---|\n");
         for CrowdRow { technique, light, instances, mask_error, missed, false_ } in &self.crowd {

@@ -6,7 +6,7 @@
 //!   count must be known. [`Counting::ZPassOutside`] takes it for 0 and is wrong wherever the eye, or the near plane, is in
 //!   a volume; [`Counting::ZPass`] counts on the CPU the triangles between the eye and the light, and keeps the faces
 //!   between the eye and the near plane by depth clamping. Without perspective the eye is a point far behind the camera:
-//!   there it is wrong where a light shines along the view to within [`FAR_BEHIND`].
+//!   there it is wrong where a light shines along the view to within 1e-4 radians (`FAR_BEHIND`).
 //! * z-fail (C. Everitt, M. Kilgard, "Practical and Robust Stenciled Shadow Volumes for Hardware-Accelerated Rendering",
 //!   2002): faces behind count, with caps, to infinity; depth clamping keeps those beyond the far plane. Right with the eye
 //!   anywhere. [`Counting::ZFailClipped`] leaves depth clamping out, and is wrong where the far plane cuts a volume open.

@@ -33,8 +33,8 @@ use glam::{Vec3, Vec4};
 use shadowfit_solver::mesh::Frame;
 use wgpu::{BlendComponent, BlendFactor, BlendOperation, BlendState};
 
-/// The least that counts as passing: a sixteenth of what a byte can show. Smaller ones make sums so large that their rounding
-/// shows where they cancel: with 1e-30, a face leaves 4e-6 of light's logarithm behind, with this 7e-7.
+/// The least that counts as passing, a sixteenth of what a byte can show: 0 has no logarithm, and the smaller the share,
+/// the coarser the sums that its logarithm is added to and taken from.
 const LEAST_TRANSMITTANCE: f32 = 1.0 / 4096.0;
 
 const NAME: &str = "transparent volumes";

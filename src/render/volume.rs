@@ -19,7 +19,7 @@
 //! A light is one homogeneous point in unit space: (direction towards it, 0) or (position, 1).
 
 use crate::scene::Scene;
-use glam::{DVec3, Vec3, Vec4};
+use glam::{DVec3, DVec4, Vec3, Vec4};
 use shadowfit_solver::mesh::{Frame, turn_key};
 use std::collections::{HashMap, HashSet};
 
@@ -27,6 +27,9 @@ use std::collections::{HashMap, HashSet};
 #[derive(Clone, Debug)]
 pub struct Casters {
     corners: Vec<[Vec3; 3]>,
+    /// (n, -n.a) of each triangle: a light lies before its front where the product with it is positive. In f64: products
+    /// of f32 coordinates are exact there.
+    planes: Vec<DVec4>,
     class_of: Vec<u32>,
     edges: Vec<Edge>,
     /// Those of an edge stand together, sorted by class.
@@ -125,7 +128,8 @@ impl Casters {
         }
         let uses = uses.into_iter().map(|(_, u)| u).collect();
         let (body_of, bodies) = (vec![0; corners.len()], vec![Body { side: 0, low: Vec3::ZERO, high: Vec3::ZERO }]);
-        Self { corners: corners.to_vec(), class_of: class_of.to_vec(), edges, uses, body_of, bodies }
+        let planes = corners.iter().map(plane).collect();
+        Self { corners: corners.to_vec(), planes, class_of: class_of.to_vec(), edges, uses, body_of, bodies }
     }
 
     /// Lets closed bodies cast with one half of their triangles: those whose front faces the light, which is where a way to
@@ -166,7 +170,7 @@ impl Casters {
 
     /// The side of a triangle that faces the light, 1 or -1; 0 where it casts nothing.
     fn facing(&self, triangle: usize, light: Vec4) -> i32 {
-        let facing = facing(&self.corners[triangle], light);
+        let facing = sign(self.planes[triangle].dot(light.as_dvec4()));
         let Body { side, low, high } = self.bodies[self.body_of[triangle] as usize];
         let p = light.truncate();
         let is_in_box = light.w != 0.0 && p.cmpge(low).all() && p.cmple(high).all();
@@ -258,13 +262,10 @@ fn uses_of(((triangle, points), &class): ((u32, &[u32; 3]), &u32)) -> impl Itera
     })
 }
 
-/// 1 where the front of a triangle faces the light, -1 where its back does, 0 edge-on. In f64: a product of f32
-/// coordinates is exact there.
-fn facing(corners: &[Vec3; 3], light: Vec4) -> i32 {
+fn plane(corners: &[Vec3; 3]) -> DVec4 {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3());
-    let light = light.as_dvec4();
-    let height = (b - a).cross(c - a).dot(light.truncate() - light.w * a);
-    sign(height)
+    let normal = (b - a).cross(c - a);
+    normal.extend(-normal.dot(a))
 }
 
 fn sign(x: f64) -> i32 {

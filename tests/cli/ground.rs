@@ -129,3 +129,29 @@ fn a_ground_that_makes_no_sense_is_refused() {
     run(&words(&["--lights", "cone:0,-60,20"])).refused(1, &["--ground", "cone:0,-60,20", "above the horizon"]);
     assert!(contents(folder.path()).is_empty());
 }
+
+#[test]
+fn the_ground_is_drawn_with_its_shadow() {
+    let folder = tempfile::tempdir().unwrap();
+    fitted(folder.path(), "plate_over_ground", &["--max-planes", "2", "--ground"]);
+    let asset = folder.path().join("plate_over_ground.shadow.glb");
+    let draw = |more: &[&str]| {
+        let out = folder.path().join("frame.png");
+        let light = ["--light", "90,50", "--view", "20,50", "--mode", "mask", "--size", "128"];
+        let words = [&["render", asset.to_str().unwrap(), "-o", out.to_str().unwrap()], &light[..], more].concat();
+        run(&words).ok();
+        image::open(out).unwrap().into_rgba8()
+    };
+    let count = |picture: &image::RgbaImage, is: fn([u8; 4]) -> bool| picture.pixels().filter(|p| is(p.0)).count();
+    let [without, with] = [draw(&[]), draw(&["--ground"])];
+    // The model's own ground is smaller than what it stands on, though the camera stands farther away.
+    let covered = |picture| count(picture, |[.., b, _]| b == 255);
+    assert!(covered(&with) > 3 * covered(&without) / 2, "{} {}", covered(&with), covered(&without));
+    let dark = count(&with, |[r, g, ..]| g == 255 && r < 128) as f64 / covered(&with) as f64;
+    assert!((0.003..0.2).contains(&dark), "{dark}");
+
+    let plain = folder.path().join("plain");
+    fitted(&plain, "plate_over_ground", &["--max-planes", "1"]);
+    let asset = plain.join("plate_over_ground.shadow.glb");
+    run(&["render", asset.to_str().unwrap(), "-o", "frame.png", "--ground"]).refused(1, &["--ground", "without"]);
+}

@@ -12,6 +12,7 @@ use shadowfit::{
         ray_traced::RayTraced,
         stage::{Placement, Stage},
         stencil_volumes::{Counting, StencilVolumes},
+        volume::Casters,
     },
     scene::Scene,
 };
@@ -125,6 +126,20 @@ fn z_fail_needs_depth_clamping_where_a_caster_crosses_the_far_plane() {
         let wrong = error(&scene, Counting::ZFailClipped, &request);
         assert!(wrong > AREA, "{light:?}: {wrong}");
     }
+}
+
+#[test]
+fn a_ground_receives_and_does_not_cast() {
+    let mut scene = empty();
+    cuboid(&mut scene, Vec3::new(0.1, 0.3, 0.0), Vec3::new(0.3, 0.1, 0.2));
+    quad(&mut scene, Vec3::new(-0.5, 0.0, 0.2), Vec3::X * 0.2, Vec3::Y * 0.7);
+    scene.stand_on_ground(&WORLD, 1.5);
+    for light in lights() {
+        let request = mask(Vec3::new(1.3, 2.0, 1.9), Vec3::new(0.0, 0.2, 0.0), light);
+        assert_right("ground", &scene, &RIGHT, &request);
+    }
+    let casters = Casters::of_scene(&scene, &WORLD, |_| 0).0;
+    assert_eq!(casters.len(), scene.soup.corners_model.len() - 2);
 }
 
 #[test]
