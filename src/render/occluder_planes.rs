@@ -5,32 +5,35 @@
 //! of them, so it costs no fragment anything. Under a directional light of some size edges are soft where textures are
 //! distance fields; for a light without size nothing is asked, so that hard edges pay nothing.
 //!
-//! What it costs on lavapipe (Mesa 22.3, LLVM 15, 8 lanes), times `none`, CPU time of 40 to 64 interleaved frames of
-//! 1024 x 1024, median of the ratios (mean), teapot in 144 sections, 774 planes, lists of at most 4, 0.67 on average:
+//! What it costs on lavapipe (Mesa 22.3, LLVM 15, 8 lanes) against `none`: CPU time of interleaved frames of 1024 x 1024
+//! (40 of one instance, 24 filling the frame, 5 to 9 of 100), median of the ratios, light still / moving; the teapot in
+//! 144 sections, 774 planes, lists of at most 4 and 0.67 on average:
 //!
-//! | technique | one instance, light still | moving | 100 instances, still | moving |
+//! | technique | turntable | one, filling the frame | 100 instances | 100, vertices alone |
 //! |---|---|---|---|---|
-//! | coordinates per fragment | 1.30 (1.40) | 1.31 | 1.32 (1.22) | 1.25 |
-//! | coordinates per vertex | 1.24 (1.26) | 1.26 | 1.61 (1.53) | 1.63 |
-//! | shadow map 512, nearest | 1.44 (1.44) | 1.83 | 1.14 (1.16) | 1.80 |
+//! | coordinates per fragment | 1.30 / 1.31 | 1.58 / 1.62 | 1.32 / 1.25 | 0.97 / 0.97 |
+//! | coordinates per vertex | 1.24 / 1.26 | 1.28 / 1.25 | 1.61 / 1.63 | 1.38 / 1.41 |
+//! | shadow map 512, nearest | 1.44 / 1.83 | 1.56 / 1.70 | 1.14 / 1.80 | 1.06 / 1.70 |
 //!
-//! Per vertex wins where fragments are many and loses where vertices are (as the thesis found): the vertex stage is 47 %
-//! of the shader time of `none` at 100 instances.
+//! The machine was shared: the same cell differs by up to 0.1 between runs. Per vertex wins where fragments are many and
+//! loses where vertices are (as the thesis found): the vertex stage is 47 % of the shader time of `none` at 100
+//! instances.
 //!
 //! Why, from samples and the disassembly of the compiled shaders:
 //! - An `if` masks lanes and jumps over nothing; a loop looks whether lanes are left only at its end. A fragment whose
-//!   list is empty paid for one plane: `none` 18.7 ms, all lists empty 29.0 ms, the true lists 31.8 ms. So where
-//!   the adapter is software, sections that read no plane in any instance are drawn by the pipeline without (60 draws
-//!   instead of one): empty lists cost 1.00.
-//! - A load from a storage buffer is a loop over the lanes, about a hundred instructions a number and 25 numbers a plane. A
-//!   texel of 128 bits is 148 instructions for 8 lanes and four numbers: planes are texels. 1.64 became 1.50.
+//!   list is empty paid for one plane: `none` 18.7 ms, all lists empty 29.0 ms, the true lists 31.8 ms. So where the
+//!   adapter is software, sections that read no plane in any instance are drawn by the pipeline without (60 draws instead
+//!   of one): empty lists cost 1.00.
+//! - A load from a storage buffer is a loop over the lanes: some hundred executed instructions a number (counted by hand:
+//!   8 turns of 12), 25 numbers a plane. A texel is 148 instructions for four numbers of 8 lanes: planes are texels. 1.64
+//!   became 1.50.
 //! - Every fragment of every technique looked for holes (four loads, one texel): a pipeline constant now leaves that out
 //!   where no image cuts any; `none` took 0.86 of its time.
-//! - An array that is indexed by a loop's counter is gathered lane by lane: the coordinates of vertices move through
-//!   variables instead; with arrays the variant cost 1.54 (1.64).
+//! - The coordinates of vertices move through variables: as arrays indexed by the loop's counter, which each lane counts
+//!   for itself, they cost 1.54 on the turntable.
 //!
-//! Rejected: the light and the base colour as flat attributes of vertices: `none` 0.71 of its time for one instance but
-//! 1.14 at 100, since the vertex stage then gathers six numbers more.
+//! Rejected: the light and the base colour as flat attributes of vertices: `none` 0.84 of its time for one instance but
+//! 1.14 at 100 (4 frames), since the vertex stage then gathers six numbers more.
 
 use super::{
     FrameRequest, Light, Mode, RenderError,

@@ -176,7 +176,7 @@ impl Stage {
         self.model.batches.iter().any(|batch| batch.transparent)
     }
 
-    /// Draw calls over some of the casters' sections.
+    /// Draw calls over some sections of all parts, by their labels.
     pub(crate) fn calls_over(&self, wanted: &dyn Fn(u32) -> bool) -> usize {
         let runs: usize = self.model.batches.iter().map(|batch| batch.runs(wanted).len()).sum();
         match self.draw_calls {
