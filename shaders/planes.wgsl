@@ -12,6 +12,9 @@ override SDF_PER_TEXEL: f32;
 // Least spread of a soft edge; shade::MIN_SPREAD.
 override MIN_SPREAD: f32;
 
+// Does some plane let light pass where it blocks? Without, visibility is one number.
+override TINTED: bool = false;
+
 // Where an occluder texture lies in the atlas.
 struct OccluderSlot {
     // x, y, width, height in texels.
@@ -35,6 +38,8 @@ struct CastingPlane {
     side: u32,
     // How fast edges soften with the distance from the plane; only lights of some size ask.
     softening: f32,
+    // The share of each linear colour that it takes where its texture blocks, one byte each.
+    tint: u32,
 }
 
 // Texture coordinates of a crossing; `casts` is false where the ray misses the rectangle.
@@ -127,43 +132,56 @@ fn list_of(instance: u32, section: u32) -> vec2u {
     return vec2u(lists[entry], lists[entry + 1u]);
 }
 
-// Predicted visibility of a receiver at p that reads `list`, under a directional light: left as soon as one plane
-// blocks.
-fn visibility(list: vec2u, p: vec3f) -> f32 {
-    var v = 1.0;
-    for (var i = list.x; i < list.y && v > 0.0; i++) {
+// What a plane leaves of the light v, per colour, where its texture blocks the share `blocked`.
+fn dimmed(v: vec3f, plane: u32, blocked: f32) -> vec3f {
+    if TINTED {
+        return v * (1.0 - blocked * unpack4x8unorm(casting[plane].tint).rgb);
+    }
+    return vec3f(v.x * (1.0 - blocked));
+}
+
+// Is something left of the light v?
+fn is_left(v: vec3f) -> bool {
+    return select(v.x > 0.0, any(v > vec3f(0.0)), TINTED);
+}
+
+// Predicted visibility, per colour, of a receiver at p that reads `list`, under a directional light: left as soon as
+// nothing is left.
+fn visibility(list: vec2u, p: vec3f) -> vec3f {
+    var v = vec3f(1.0);
+    for (var i = list.x; i < list.y && is_left(v); i++) {
         let plane = lists[i];
         let hit = crossing(casting[plane], p);
         if hit.casts {
-            v *= 1.0 - sample(casting[plane].slot, hit.ab);
+            v = dimmed(v, plane, sample(casting[plane].slot, hit.ab));
         }
     }
     return v;
 }
 
 // The same with soft edges.
-fn visibility_soft(list: vec2u, p: vec3f) -> f32 {
-    var v = 1.0;
-    for (var i = list.x; i < list.y && v > 0.0; i++) {
+fn visibility_soft(list: vec2u, p: vec3f) -> vec3f {
+    var v = vec3f(1.0);
+    for (var i = list.x; i < list.y && is_left(v); i++) {
         let plane = lists[i];
         let p1 = vec4f(p, 1.0);
         let s = dot(casting[plane].s, p1);
         if s > casting[plane].bias {
             let ab = vec2f(dot(casting[plane].a, p1), dot(casting[plane].b, p1));
-            v *= 1.0 - sample_soft(casting[plane].slot, ab, spread(casting[plane].softening, s));
+            v = dimmed(v, plane, sample_soft(casting[plane].slot, ab, spread(casting[plane].softening, s)));
         }
     }
     return v;
 }
 
 // The same as `visibility` under a point light at c.
-fn visibility_point_light(list: vec2u, c: vec3f, p: vec3f) -> f32 {
-    var v = 1.0;
-    for (var i = list.x; i < list.y && v > 0.0; i++) {
+fn visibility_point_light(list: vec2u, c: vec3f, p: vec3f) -> vec3f {
+    var v = vec3f(1.0);
+    for (var i = list.x; i < list.y && is_left(v); i++) {
         let plane = lists[i];
         let hit = crossing_point_light(casting[plane], c, p);
         if hit.casts {
-            v *= 1.0 - sample(casting[plane].slot, hit.ab);
+            v = dimmed(v, plane, sample(casting[plane].slot, hit.ab));
         }
     }
     return v;

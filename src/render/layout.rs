@@ -62,7 +62,7 @@ pub struct CastingPlane {
     pub bias: f32,
     pub side: u32,
     pub softening: f32,
-    pub padding: u32,
+    pub tint: u32,
 }
 
 impl CastingPlane {
@@ -88,7 +88,9 @@ impl CastingPlane {
             Side::Front => 1,
             Side::Back => 2,
         };
-        let plane = Self { a, b, s, slot: slot.into(), bias: baked.bias, side, softening: 0.0, padding: 0 };
+        let [red, green, blue] = baked.tint;
+        let tint = u32::from_le_bytes([red, green, blue, 0]);
+        let plane = Self { a, b, s, slot: slot.into(), bias: baked.bias, side, softening: 0.0, tint };
         (a.is_finite() && b.is_finite() && s.is_finite() && baked.bias.is_finite()).then_some(plane)
     }
 }
@@ -198,7 +200,7 @@ pub fn struct_layouts() -> Vec<StructLayout> {
         layout!(Frame { clip_from_world, light, eye }),
         layout!(Instance { clip_from_unit, world_from_unit, light }),
         layout!(OccluderSlot { region, layer, channel, encoding }),
-        layout!(CastingPlane { a, b, s, slot, bias, side, softening }),
+        layout!(CastingPlane { a, b, s, slot, bias, side, softening, tint }),
         layout!(Rectangle { origin, u, v, plane, a, b, color, slot }),
         layout!(SilhouetteEdge { a, b }),
         layout!(Material { base_color, alpha_cutoff, repeat_u, repeat_v }),

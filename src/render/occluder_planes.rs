@@ -75,7 +75,7 @@ impl OccluderPlanes {
         let array = texture(wgpu::TextureViewDimension::D2Array);
         let bindings = [(fragment, STORAGE), (fragment, array), (fragment, SAMPLER), (fragment, STORAGE)];
         let group_layout = layout(gpu, "planes", &bindings);
-        let options = ForwardOptions { constants: forward_constants(light_radius_rad), ..Default::default() };
+        let options = ForwardOptions { constants: forward_constants(set, light_radius_rad), ..Default::default() };
         let forward = Forward::new(stage, &OCCLUDER_PLANES, Some(&group_layout), options);
         let group = group(gpu, &group_layout, &resources((&casting, &lists), &occluders, &sampler));
         gpu.check()?;
@@ -102,7 +102,7 @@ impl OccluderPlanes {
 
     /// The pipeline constants of planes.wgsl and occluder_planes.wgsl.
     pub(crate) fn forward_constants(&self) -> Vec<(&'static str, f64)> {
-        forward_constants(self.light_radius_rad)
+        forward_constants(&self.set, self.light_radius_rad)
     }
 
     /// Bindings 0 to 3 of group 2.
@@ -209,9 +209,10 @@ pub(crate) fn constants() -> [(&'static str, f64); 4] {
     ]
 }
 
-fn forward_constants(light_radius_rad: f32) -> Vec<(&'static str, f64)> {
+fn forward_constants(set: &BakedSet, light_radius_rad: f32) -> Vec<(&'static str, f64)> {
     let mut all = constants().to_vec();
     all.push(("LIGHT_SINE", f64::from(light_radius_rad.sin())));
+    all.push(("TINTED", f64::from(u8::from(set.is_tinted()))));
     all
 }
 
