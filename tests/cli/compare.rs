@@ -73,7 +73,7 @@ fn an_asset_is_not_fitted_again_and_no_instances_are_no_test() {
     let files = files_of(&out);
     let json: Value = serde_json::from_slice(&files["plate_over_ground.shadow.techniques.json"]).unwrap();
     let names: Vec<String> = rows(&json).into_iter().map(|row| row.0).collect();
-    assert_eq!(names, ["none", "occluder planes, asset"]);
+    assert_eq!(names, ["none", "occluder planes, asset", "occluder planes, per vertex, asset"]);
     assert_eq!(json["scaling"], Value::Array(Vec::new()));
 }
 
