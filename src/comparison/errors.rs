@@ -122,7 +122,7 @@ fn reference(
             (Against::Soft, Light::Directional { to_light }) => {
                 traced.soft_picture(&view, &AreaLight::distant(to_light, SOFT_HALF_ANGLE_RAD), SOFT_SAMPLES)
             }
-            _ => traced.picture(&view),
+            _ => traced.transmitted_picture(&view),
         }
     };
     let counts = match world {
