@@ -203,6 +203,7 @@ fn tints_agree_under_all_lights() {
     }
     let mut twins = Twins::new(&scene, &mesh, &planes);
     let mut walls = Twins::new(&scene, &mesh, &opaque);
+    let mut changed = 0;
     for light in lights(&planes) {
         let [camera, _, soft, ..] = views()[..] else { unreachable!("six views") };
         for camera in [camera, soft] {
@@ -212,11 +213,10 @@ fn tints_agree_under_all_lights() {
             let mean = steps as f64 / gpu.len() as f64;
             assert!(mean < 0.5, "{light:?}: mean difference {mean}");
             let wall = walls.gpu.render(&request).expect("drawn");
-            let changed = gpu.pixels().zip(wall.pixels()).filter(|(p, q)| p != q).count();
-            let casts = matches!(light, Light::Directional { to_light } if to_light.y > 0.2);
-            assert!(!casts || changed > 1000, "{light:?}: {changed} pixels");
+            changed += gpu.pixels().zip(wall.pixels()).filter(|(p, q)| p != q).count();
         }
     }
+    assert!(changed > 3_000, "the tints change too little to test anything: {changed}");
     keep(&twins.gpu.render(&request(views()[0], lights(&planes)[0], Mode::Shaded)).expect("drawn"), "tints.png");
 }
 

@@ -94,7 +94,7 @@ pub fn assign(table: &PairTable, planes: &[Found], options: &ListOptions) -> Sec
         covers: table.lights.iter().map(|rows| vec![0; rows.end - rows.start]).collect(),
     };
     assignment.start();
-    if !table.arrives.is_empty() {
+    if table.has_tints() {
         return tinted::assign(&assignment);
     }
     for _ in 0..options.rounds {

@@ -11,6 +11,7 @@ use crate::{
 };
 use glam::Vec3;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// The rows of one light in a [`PairTable`].
 #[derive(Clone, Copy, Debug)]
@@ -199,6 +200,24 @@ impl PairTable {
     #[must_use]
     pub fn arriving(&self, i: usize) -> Vec3 {
         arriving(&self.vote, &self.arrives, i)
+    }
+
+    /// Does some pair lose a part of the light and keep another?
+    #[must_use]
+    pub fn has_tints(&self) -> bool {
+        self.arrives.iter().any(|v| *v != Vec3::ZERO && *v != Vec3::ONE)
+    }
+
+    /// The pairs with the votes by which planes are searched: where something is kept, what is lost of the light. With
+    /// whole votes a propeller's faint disc (a twelfth is lost) was worth as many planes as a wall.
+    #[must_use]
+    pub fn by_loss(&self) -> Cow<'_, Self> {
+        if !self.has_tints() {
+            return Cow::Borrowed(self);
+        }
+        let vote =
+            |i: usize| if self.vote[i] > 0.0 { taken(&self.vote, &self.arrives, i) as f32 } else { self.vote[i] };
+        Cow::Owned(Self { vote: (0..self.len()).map(vote).collect(), ..self.clone() })
     }
 
     /// Receiver position of pair `i`.

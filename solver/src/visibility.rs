@@ -4,8 +4,8 @@
 //! where the light is blocked, negative where it is not. A texel of an occluder texture should block exactly where
 //! the votes of the pairs whose rays cross it sum to more than zero; everything later works on these four columns.
 //!
-//! Where surfaces let light pass, a fifth column says what arrives. A pair of which anything is taken counts as blocked:
-//! the search then finds a pane as it finds a wall, and how much the pane takes is decided with the lists.
+//! Where surfaces let light pass, a fifth column says what arrives. A pair of which anything is taken counts as blocked;
+//! how much a plane takes is decided with the lists.
 
 use crate::{mesh::Mesh, receivers::Receivers, sampling::uniform};
 use glam::Vec3;

@@ -141,7 +141,8 @@ impl RayTraced {
         view.primary.picture((&self.scene, &self.mesh), view.mode, &light, visibility)
     }
 
-    /// Soft shadows of `side` x `side` samples of an area light, in the place of the view's light.
+    /// Soft shadows of `side` x `side` samples of an area light, in the place of the view's light; materials let light
+    /// through as in [`RayTraced::transmitted_picture`].
     ///
     /// # Errors
     /// [`RenderError::NeedsAdapter`] for [`Mode::Planes`].
@@ -149,8 +150,8 @@ impl RayTraced {
         let samples: Vec<Light> =
             light.samples(side).into_iter().map(|position| self.moved(Light::Point { position })).collect();
         let visibility = |hit: &PrimaryHit| {
-            let lit = samples.iter().filter(|sample| self.is_lit(hit, sample)).count();
-            Vec3::splat(lit as f32 / samples.len() as f32)
+            let arriving: Vec3 = samples.iter().map(|sample| self.transmitted(hit, sample)).sum();
+            arriving / samples.len() as f32
         };
         view.primary.picture((&self.scene, &self.mesh), view.mode, &self.moved(light.middle()), visibility)
     }

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 const CELLS: f32 = 12.0;
 
 /// Most tints of one plane.
-const MOST: usize = 4;
+pub(super) const MOST: usize = 4;
 
 /// A further tint must take this share of the shadow that the plane explains: noise at borders takes less.
 const LEAST_GAIN: f64 = 0.01;
