@@ -15,7 +15,6 @@ use serde_json::Value;
 use shadowfit::scene;
 use shadowfit_solver::{
     lights::LightDomain,
-    mesh::Mesh,
     receivers::{ReceiverOptions, sample},
     shadow_map::{EquivalentSize, SIZES, equivalent_size},
     visibility::trace,
@@ -225,7 +224,7 @@ fn run(table: &Table, cases: &[Case], binary: &Path) -> Result<(), Box<dyn Error
 
 /// Texels a side of the shadow map that leaves `error` on this model.
 fn shadow_map_texels(model: &Path, error: f64) -> Result<String, Box<dyn Error>> {
-    let mesh = Mesh::new(&scene::load(model)?.soup)?;
+    let mesh = scene::load(model)?.mesh()?;
     let (count, exposure_rays, lights, seed) = MAP_SAMPLING;
     let receivers = sample(&mesh, &ReceiverOptions { count, exposure_rays, seed });
     let domain = LightDomain::Sphere;

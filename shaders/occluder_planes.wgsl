@@ -7,12 +7,12 @@ fn predicted_visibility(surface: Surface) -> vec3f {
     let list = list_of(surface.instance, surface.section);
     let light = instances[surface.instance].light.xyz;
     if POINT_LIGHT {
-        return vec3f(visibility_point_light(list, light, surface.p));
+        return visibility_point_light(list, light, surface.p);
     }
     if LIGHT_SINE > 0.0 {
         // Visibility is asked for only where the side that is drawn faces the light.
         let n_dot_l = abs(dot(surface.geometric_normal, light));
-        return vec3f(horizon(n_dot_l, LIGHT_SINE) * visibility_soft(list, surface.p));
+        return horizon(n_dot_l, LIGHT_SINE) * visibility_soft(list, surface.p);
     }
-    return vec3f(visibility(list, surface.p));
+    return visibility(list, surface.p);
 }

@@ -19,8 +19,10 @@ override SDF_PER_TEXEL: f32;
 // Least spread of a soft edge; shade::MIN_SPREAD.
 override MIN_SPREAD: f32;
 
-// Texels of a plane.
-const PLANE_TEXELS: u32 = 4;
+// Texels of a plane: 4, and one more where some plane lets light pass where it blocks. Without, visibility is one
+// number.
+override PLANE_TEXELS: u32;
+override TINTED: bool = PLANE_TEXELS > 4u;
 
 // Where an occluder texture lies in the atlas.
 struct OccluderSlot {
@@ -158,43 +160,57 @@ fn list_of(instance: u32, section: u32) -> vec2u {
     return vec2u(list.x, list.y);
 }
 
-// Predicted visibility of a receiver at p that reads `list`, under a directional light: left as soon as one plane
-// blocks.
-fn visibility(list: vec2u, p: vec3f) -> f32 {
-    var v = 1.0;
-    for (var i = list.x; i < list.y && v > 0.0; i += PLANE_TEXELS) {
+// What the plane at texel `i` leaves of the light v, per colour, where its texture blocks the share `blocked`.
+fn dimmed(v: vec3f, i: u32, blocked: f32) -> vec3f {
+    if TINTED {
+        // The share of each linear colour that it takes, one byte each.
+        return v * (1.0 - blocked * unpack4x8unorm(casting_texel(i + 4u).x).rgb);
+    }
+    return vec3f(v.x * (1.0 - blocked));
+}
+
+// Is something left of the light v?
+fn is_left(v: vec3f) -> bool {
+    return select(v.x > 0.0, any(v > vec3f(0.0)), TINTED);
+}
+
+// Predicted visibility, per colour, of a receiver at p that reads `list`, under a directional light: left as soon as
+// nothing is left.
+fn visibility(list: vec2u, p: vec3f) -> vec3f {
+    var v = vec3f(1.0);
+    for (var i = list.x; i < list.y && is_left(v); i += PLANE_TEXELS) {
         let plane = casting_plane(i);
         let hit = crossing(plane, p);
         if hit.casts {
-            v *= 1.0 - sample(plane.slot, hit.ab);
+            v = dimmed(v, i, sample(plane.slot, hit.ab));
         }
     }
     return v;
 }
 
 // The same with soft edges.
-fn visibility_soft(list: vec2u, p: vec3f) -> f32 {
-    var v = 1.0;
-    for (var i = list.x; i < list.y && v > 0.0; i += PLANE_TEXELS) {
+fn visibility_soft(list: vec2u, p: vec3f) -> vec3f {
+    var v = vec3f(1.0);
+    for (var i = list.x; i < list.y && is_left(v); i += PLANE_TEXELS) {
         let plane = casting_plane(i);
         let p1 = vec4f(p, 1.0);
         let s = dot(plane.s, p1);
         if s > plane.bias {
             let ab = vec2f(dot(plane.a, p1), dot(plane.b, p1));
-            v *= 1.0 - sample_soft(plane.slot, ab, spread(plane.softening, s));
+            v = dimmed(v, i, sample_soft(plane.slot, ab, spread(plane.softening, s)));
         }
     }
     return v;
 }
 
 // The same as `visibility` under a point light at c.
-fn visibility_point_light(list: vec2u, c: vec3f, p: vec3f) -> f32 {
-    var v = 1.0;
-    for (var i = list.x; i < list.y && v > 0.0; i += PLANE_TEXELS) {
+fn visibility_point_light(list: vec2u, c: vec3f, p: vec3f) -> vec3f {
+    var v = vec3f(1.0);
+    for (var i = list.x; i < list.y && is_left(v); i += PLANE_TEXELS) {
         let plane = casting_plane(i);
         let hit = crossing_point_light(plane, c, p);
         if hit.casts {
-            v *= 1.0 - sample(plane.slot, hit.ab);
+            v = dimmed(v, i, sample(plane.slot, hit.ab));
         }
     }
     return v;

@@ -26,7 +26,6 @@ use crate::{
 use divided::Divided;
 use shadowfit_solver::{
     baselines::{Baseline, BaselineOptions},
-    mesh::Mesh,
     metrics::measure_tables,
     plane::Encoding,
     search::{BIAS, Found, SearchOptions, Selection, Verdict, place, place_loosely, search},
@@ -90,7 +89,7 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Abl
     check_outputs(request)?;
     progress(format!("reading {}", request.model.display()));
     let scene = scene::load(&request.model)?;
-    let mesh = Mesh::new(&scene.soup).map_err(|source| FitError::Mesh { path: request.model.clone(), source })?;
+    let mesh = scene.mesh().map_err(|source| FitError::Mesh { path: request.model.clone(), source })?;
     progress("tracing the reference".to_string());
     let (pairs, receivers) = held_out(&mesh, request, HELD_OUT, Purpose::HeldOut);
     let pilot = fitting::pilot(request, &mesh);

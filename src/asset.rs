@@ -120,6 +120,8 @@ pub struct ModelPlane {
     pub rectangle: Rectangle,
     /// What it blocks.
     pub texture: OccluderTexture,
+    /// The share of each linear colour that it takes where its texture blocks, in 255ths.
+    pub tint: [u8; 3],
     /// Which receivers it serves.
     pub side: Side,
     /// A receiver nearer than this along the ray is not shadowed, metres.
@@ -182,6 +184,7 @@ impl ShadowSet {
         let baked = |plane: &ModelPlane| BakedPlane {
             plane: plane.rectangle.in_unit_space(frame),
             texture: plane.texture.clone(),
+            tint: plane.tint,
             side: plane.side,
             bias: (plane.bias / frame.radius) as f32,
         };

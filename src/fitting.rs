@@ -275,7 +275,7 @@ fn is_simple(request: &FitRequest, mesh: &Mesh, pilot: &Pairs) -> bool {
         directions = directions.repeat(2);
     }
     let options = SearchOptions { max_planes, seed: request.seed, replace_rounds: 1, ..plan.search };
-    let found = search(mesh, &table, &options, plan.min_gain * shadow, &mut |_| Verdict::Continue);
+    let found = search(mesh, &table.by_loss(), &options, plan.min_gain * shadow, &mut |_| Verdict::Continue);
     let fits = [assign(&table, &found.planes, &ListOptions { max_lookups: max_planes, grid: 128, ..plan.lists })];
     let set = bake(&fits, &directions, shadow, &plan.budget);
     let error = |set: &BakedSet, pairs: &Pairs, section: u32| measure(set, pairs, &vec![section; pairs.receivers]);
@@ -363,7 +363,7 @@ impl Fit<'_> {
             let is_ground = self.ground.is_some() && section + 1 == tables.len();
             let options = ground.search.as_ref().filter(|_| is_ground).unwrap_or(options);
             let min_gain = min_gain * self.traced.shadow;
-            search(self.mesh, table, options, min_gain, &mut |_| Verdict::Continue).planes
+            search(self.mesh, &table.by_loss(), options, min_gain, &mut |_| Verdict::Continue).planes
         };
         Ok((tables.par_iter().enumerate().map(search).collect(), Vec::new()))
     }
@@ -400,7 +400,7 @@ impl Fit<'_> {
             }
         };
         let min_gain = self.plan.min_gain * shadow;
-        let selection = search(self.mesh, table, &self.plan.search, min_gain, &mut judge);
+        let selection = search(self.mesh, &table.by_loss(), &self.plan.search, min_gain, &mut judge);
         let count = selection.planes.len();
         let prefixes: Vec<BakedSet> = (1..count).into_par_iter().map(|k| bake_prefix(&selection.greedy[..k])).collect();
         (vec![selection.planes], prefixes.into_iter().zip(found_at_s).collect())

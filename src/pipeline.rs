@@ -145,7 +145,7 @@ pub fn run(request: &FitRequest, progress: &mut dyn FnMut(String)) -> Result<Rep
     let scene = scene::load(&request.model)?;
     time_s.load = clock.lap();
     let mesh_error = |source| FitError::Mesh { path: request.model.clone(), source };
-    let mesh = Mesh::new(&scene.soup).map_err(mesh_error)?;
+    let mesh = scene.mesh().map_err(mesh_error)?;
     time_s.bvh = clock.lap();
 
     let fitted = fit(request, (&scene, &mesh), progress, &mut time_s)?;

@@ -38,7 +38,7 @@ pub use primitive::MAX_COORDINATE;
 use crate::gltf_file::{self, GltfFile, Invalid};
 use glam::{DAffine3, Vec2, Vec3};
 use serde::Serialize;
-use shadowfit_solver::mesh::Soup;
+use shadowfit_solver::mesh::{Mesh, MeshError, Soup};
 use std::{
     collections::HashMap,
     io,
@@ -59,7 +59,7 @@ pub struct Material {
     pub alpha_cutoff: Option<f32>,
     /// Linear RGB share of the light that passes (alphaMode BLEND); `None` where the material is opaque. Of alpha `a` and
     /// base colour `c`, the share `1 - a` passes, tinted by `c` as far as the surface is there: `(1 - a)(1 - a (1 - c))`,
-    /// the mean over all texels of the image. Shadow planes and most techniques take such materials for opaque.
+    /// the mean over all texels of the image. Most techniques take such materials for opaque, shadow planes do not.
     pub transmittance: Option<[f32; 3]>,
 }
 
@@ -110,6 +110,20 @@ pub struct Scene {
     pub skipped: Vec<Skipped>,
     /// How many of the last triangles are a ground (see [`Scene::stand_on_ground`]); 0 of a file.
     pub ground_triangles: usize,
+}
+
+impl Scene {
+    /// The triangles with a BVH, and what light passes their materials.
+    ///
+    /// # Errors
+    /// As of [`Mesh::new`].
+    pub fn mesh(&self) -> Result<Mesh, MeshError> {
+        let transmittance = |triangle: usize| {
+            let material = &self.materials[self.material_of[triangle] as usize];
+            material.transmittance.map_or(Vec3::ZERO, Vec3::from_array)
+        };
+        Ok(Mesh::new(&self.soup)?.with_transmittance(transmittance))
+    }
 }
 
 /// Why a file is not a scene.

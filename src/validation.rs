@@ -151,7 +151,7 @@ pub fn validate(
         for (index, &to_light) in lights.iter().enumerate() {
             let light = Light::Directional { to_light };
             let visibility =
-                |hit: &PrimaryHit| f32::from(!mesh.is_blocked(ray_origin(hit.p_unit, hit.normal), to_light));
+                |hit: &PrimaryHit| mesh.transmitted(ray_origin(hit.p_unit, hit.normal), to_light, f32::INFINITY);
             let mut draw = |mode| {
                 let options = FrameOptions { size_px, mode, antialias: Antialias::Off };
                 renderer.render(&FrameRequest { camera, light, options })

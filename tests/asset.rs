@@ -165,7 +165,7 @@ fn unit_space_planes_cast_the_same_shadow() {
     let planes = planes(6);
     let back = read(&folders.write(&input, &planes).unwrap().model).unwrap().in_unit_space(&FRAME);
     let l = Vec3::new(0.3, 0.8, 0.5).normalize();
-    let shadow = |set: &BakedSet, p: Vec3| visibility(&set.planes, &set_rows(set, l), &set.lists(l)[0], p);
+    let shadow = |set: &BakedSet, p: Vec3| visibility(&set.planes, &set_rows(set, l), &set.lists(l)[0], p).x;
     let planes = BakedSet::one_section(planes);
     let mut numbers = fixtures::Numbers(1);
     for _ in 0..200 {

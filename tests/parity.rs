@@ -11,7 +11,7 @@ use shadowfit::{
 };
 use shadowfit_solver::{
     mesh::{Mesh, Sides},
-    plane::{ActiveLists, BakedPlane, BakedSet, Encoding, OccluderTexture, ShadowPlane, Side},
+    plane::{ActiveLists, BakedPlane, BakedSet, Encoding, OPAQUE, OccluderTexture, ShadowPlane, Side},
     shade::EDGE_ON,
 };
 use std::sync::LazyLock;
@@ -192,6 +192,34 @@ fn sections_agree_under_all_lights() {
     assert!(changed > 10_000, "the lists change too little to test anything: {changed}");
 }
 
+/// Planes that take a part of each colour: frames agree in all of them, and differ from those of opaque planes.
+#[test]
+fn tints_agree_under_all_lights() {
+    let (scene, opaque) = (procedural::scene(), procedural::planes());
+    let mesh = mesh_of(&scene);
+    let mut planes = opaque.clone();
+    for (i, baked) in (0u8..).zip(&mut planes) {
+        baked.tint = [255 - 30 * i, 40 * i, 200];
+    }
+    let mut twins = Twins::new(&scene, &mesh, &planes);
+    let mut walls = Twins::new(&scene, &mesh, &opaque);
+    let mut changed = 0;
+    for light in lights(&planes) {
+        let [camera, _, soft, ..] = views()[..] else { unreachable!("six views") };
+        for camera in [camera, soft] {
+            let request = request(camera, light, Mode::Shaded);
+            let [gpu, cpu] = twins.render(&request);
+            let steps: u64 = gpu.iter().zip(cpu.iter()).map(|(x, y)| u64::from(x.abs_diff(*y))).sum();
+            let mean = steps as f64 / gpu.len() as f64;
+            assert!(mean < 0.5, "{light:?}: mean difference {mean}");
+            let wall = walls.gpu.render(&request).expect("drawn");
+            changed += gpu.pixels().zip(wall.pixels()).filter(|(p, q)| p != q).count();
+        }
+    }
+    assert!(changed > 3_000, "the tints change too little to test anything: {changed}");
+    keep(&twins.gpu.render(&request(views()[0], lights(&planes)[0], Mode::Shaded)).expect("drawn"), "tints.png");
+}
+
 /// Under lights of some size values between light and shadow are many: their mean counts. Point lights stay hard.
 #[test]
 fn soft_edges_agree_under_all_lights() {
@@ -329,7 +357,7 @@ fn plate(y: f32, half: f32, side: Side) -> BakedPlane {
     let origin = Vec3::new(-half, y, -half);
     let plane = ShadowPlane { origin, u: Vec3::X * 2.0 * half, v: Vec3::Z * 2.0 * half };
     let texture = OccluderTexture { width: 10, height: 10, encoding: Encoding::Coverage, texels };
-    BakedPlane { plane, texture, side, bias: 1e-4 }
+    BakedPlane { plane, texture, tint: OPAQUE, side, bias: 1e-4 }
 }
 
 /// Is `q`, a point of the plate, in its blocking part? The filter crosses one half at the edge of a texel; but for

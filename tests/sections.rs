@@ -23,7 +23,7 @@ use shadowfit::{
 };
 use shadowfit_solver::{
     mesh::Frame,
-    plane::{ActiveLists, BakedPlane, BakedSet, Encoding, OccluderTexture, ShadowPlane, Side},
+    plane::{ActiveLists, BakedPlane, BakedSet, Encoding, OPAQUE, OccluderTexture, ShadowPlane, Side},
     sampling::uniform,
 };
 use std::{
@@ -49,6 +49,7 @@ fn plane(seed: u64) -> BakedPlane {
             v: Vec3::new(0.0, 1.0, number(5)),
         },
         texture: OccluderTexture { width, height, encoding, texels: (0..width * height).map(texel).collect() },
+        tint: OPAQUE,
         side: Side::Both,
         bias: 1e-3,
     }

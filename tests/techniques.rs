@@ -28,6 +28,8 @@ mod soft_planar;
 mod stages;
 #[path = "techniques/stencil_volumes.rs"]
 mod stencil_volumes;
+#[path = "techniques/tints.rs"]
+mod tints;
 #[path = "techniques/transparent.rs"]
 mod transparent;
 #[path = "techniques/unshadowed.rs"]

@@ -53,7 +53,7 @@ pub fn difference(set: &BakedSet, pairs: &Pairs, section_of: &[u32]) -> f64 {
         };
         for i in 0..light.len() {
             let (list, p) = (&lists[section_of[light.receiver[i] as usize] as usize], light.point(i));
-            let single = f64::from(visibility(&set.planes, &rows, list, p));
+            let single = f64::from(visibility(&set.planes, &rows, list, p).x);
             different += f64::from(light.vote[i].abs()) * (single - exact(list, p)).abs();
         }
     }

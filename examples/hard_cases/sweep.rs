@@ -64,7 +64,7 @@ fn frame(fitted: &Fitted, receivers: &Receivers, section_of: &[u32], light: Vec3
         if cosine <= 0.0 {
             return [0.0; 3];
         }
-        let predicted = visibility(&set.planes, &rows, &lists[section_of[i] as usize], receivers.points[i]);
+        let predicted = visibility(&set.planes, &rows, &lists[section_of[i] as usize], receivers.points[i]).x;
         let traced = f32::from(u8::from(!fitted.mesh.is_blocked(receivers.origins[i], light)));
         [receivers.weights[i] * cosine, predicted, traced]
     };

@@ -78,11 +78,11 @@ fn bake_sizes(
 }
 
 /// The plane with a texture of the given size; `None` where it would block nothing.
-fn baked(plane: &VotedPlane, (encoding, size): (Encoding, (usize, usize)), smoothing: usize) -> Option<BakedPlane> {
-    let votes: Vec<f32> = plane.votes[0].iter().zip(&plane.votes[1]).map(|(a, b)| a + b).collect();
-    let grid = VoteGrid { votes: &votes, width: plane.width, height: plane.height };
+fn baked(voted: &VotedPlane, (encoding, size): (Encoding, (usize, usize)), smoothing: usize) -> Option<BakedPlane> {
+    let votes: Vec<f32> = voted.votes[0].iter().zip(&voted.votes[1]).map(|(a, b)| a + b).collect();
+    let grid = VoteGrid { votes: &votes, width: voted.width, height: voted.height };
     let texture = VotedShape::new(grid, smoothing).texture(encoding, size);
     let blocks = texture.texels.iter().any(|&texel| !texture.is_open(texel));
-    let PlacedPlane { plane, side, bias } = plane.placed;
-    blocks.then_some(BakedPlane { plane, texture, side, bias })
+    let PlacedPlane { plane, side, bias } = voted.placed;
+    blocks.then_some(BakedPlane { plane, texture, tint: voted.tint, side, bias })
 }

@@ -86,9 +86,9 @@ fn joined(halves: Vec<PairTable>, mirror: &Mirror, directions: &[Vec3]) -> PairT
 pub fn unfolded(half: BakedSet, mirror: &Mirror) -> BakedSet {
     let (planes, sections) = (half.planes.len() as u32, half.model_sections());
     let image = |baked: &BakedPlane| {
-        let BakedPlane { plane, side, bias, ref texture } = *baked;
+        let BakedPlane { plane, side, bias, ref texture, tint } = *baked;
         let PlacedPlane { plane, side, bias } = mirror.placed(&PlacedPlane { plane, side, bias });
-        BakedPlane { plane, texture: texture.clone(), side, bias }
+        BakedPlane { plane, texture: texture.clone(), tint, side, bias }
     };
     let images: Vec<BakedPlane> = half.planes.iter().map(image).collect();
     let of_images = |list: &Vec<u32>| -> Vec<u32> { list.iter().map(|plane| plane + planes).collect() };

@@ -4,12 +4,16 @@
 //! votes of the pairs that it is read for and no other plane covers, on a fine grid. Method: textures and lists are
 //! decided in turn, each with the other frozen (the alternation of Lloyd's k-means): a plane specialises in the lights
 //! it is read under, and lists follow what planes have become. A texture is counted under lights that did not decide it.
+//! Where surfaces let light pass, planes get tints (`tinted`).
 //!
 //! Not guaranteed: the best lists (the alternation ends in a local optimum).
 
+mod tinted;
+mod tints;
+
 use crate::{
     pair_table::{LightRows, MAX_TEXELS, PairTable, SPARE},
-    plane::PlacedPlane,
+    plane::{OPAQUE, PlacedPlane},
     search::Found,
     smoothing::{fill_unvoted, smoothed},
 };
@@ -34,6 +38,8 @@ pub struct ListOptions {
 pub struct VotedPlane {
     /// Where it lies and how it casts.
     pub placed: PlacedPlane,
+    /// The share of each linear colour that it takes where it blocks, in 255ths.
+    pub tint: [u8; 3],
     /// Texels of the grid along u.
     pub width: usize,
     /// Texels of the grid along v.
@@ -88,6 +94,9 @@ pub fn assign(table: &PairTable, planes: &[Found], options: &ListOptions) -> Sec
         covers: table.lights.iter().map(|rows| vec![0; rows.end - rows.start]).collect(),
     };
     assignment.start();
+    if table.has_tints() {
+        return tinted::assign(&assignment);
+    }
     for _ in 0..options.rounds {
         assignment.choose_lists();
         for k in 0..planes.len() {
@@ -109,6 +118,21 @@ impl Candidate {
         let open = || vec![0; size.0 * size.1 + SPARE];
         Self { placed, size, texels, blocked: open(), by_fold: [open(), open()] }
     }
+}
+
+/// The textures of all votes and of each fold's.
+fn decided(votes: [Vec<f32>; 2], width: usize, smoothing: usize) -> (Vec<u8>, [Vec<u8>; 2]) {
+    let decide = |mut votes: Vec<f32>| {
+        for _ in 0..smoothing {
+            votes = smoothed(&votes, width);
+        }
+        fill_unvoted(&mut votes, width);
+        let mut blocked: Vec<u8> = votes.into_iter().map(|vote| u8::from(vote > 0.0)).collect();
+        blocked.extend([0; SPARE]);
+        blocked
+    };
+    let both = votes[0].iter().zip(&votes[1]).map(|(a, b)| a + b).collect();
+    (decide(both), votes.map(decide))
 }
 
 impl Assignment<'_> {
@@ -176,18 +200,7 @@ impl Assignment<'_> {
     /// Decides the texture of plane `k` anew, the others frozen.
     fn decide_texture(&mut self, k: usize) {
         let votes = self.votes(k);
-        let width = self.planes[k].size.0;
-        let decide = |mut votes: Vec<f32>| {
-            for _ in 0..self.options.smoothing {
-                votes = smoothed(&votes, width);
-            }
-            fill_unvoted(&mut votes, width);
-            let mut blocked: Vec<u8> = votes.into_iter().map(|vote| u8::from(vote > 0.0)).collect();
-            blocked.extend([0; SPARE]);
-            blocked
-        };
-        let both = votes[0].iter().zip(&votes[1]).map(|(a, b)| a + b).collect();
-        let (blocked, by_fold) = (decide(both), votes.map(decide));
+        let (blocked, by_fold) = decided(votes, self.planes[k].size.0, self.options.smoothing);
         let (plane, read) = (&self.planes[k], &self.read);
         let update = |(rows, covers): (&LightRows, &mut Vec<u8>)| {
             if read[rows.direction][k] {
@@ -278,7 +291,7 @@ impl Assignment<'_> {
         let list = |read: &Vec<bool>| (0..).zip(&used).filter(|(_, k)| read[**k]).map(|(i, _)| i).collect();
         let planes = used.iter().map(|&k| {
             let Candidate { placed, size: (width, height), .. } = self.planes[k];
-            VotedPlane { placed, width, height, votes: self.votes(k) }
+            VotedPlane { placed, tint: OPAQUE, width, height, votes: self.votes(k) }
         });
         SectionFit { planes: planes.collect(), lists: self.read.iter().map(list).collect() }
     }

@@ -164,6 +164,8 @@ pub struct Mesh {
     pub duplicates: usize,
     cutout: Vec<Option<Arc<Cutout>>>,
     cutout_uv: Vec<[Vec2; 3]>,
+    /// The share of each linear colour that passes; `None`: nothing passes any triangle.
+    transmittance: Option<Vec<Vec3>>,
     bvh: CwBvh,
 }
 
@@ -219,8 +221,24 @@ impl Mesh {
             source,
             zero_area,
             duplicates,
+            transmittance: None,
             bvh,
         })
+    }
+
+    /// The same model where light passes surfaces: `transmittance` gives the share of each linear colour, 0 to 1, for a
+    /// triangle of the soup.
+    #[must_use]
+    pub fn with_transmittance(self, transmittance: impl Fn(usize) -> Vec3) -> Self {
+        let of_triangles: Vec<Vec3> = self.source.iter().map(|source| transmittance(*source as usize)).collect();
+        let passes = of_triangles.iter().any(|share| *share != Vec3::ZERO);
+        Self { transmittance: passes.then_some(of_triangles), ..self }
+    }
+
+    /// Does every triangle block all light?
+    #[must_use]
+    pub fn is_opaque(&self) -> bool {
+        self.transmittance.is_none()
     }
 
     /// Number of triangles.
@@ -277,16 +295,10 @@ impl Mesh {
     }
 
     /// The share of the light, per colour, that reaches `origin` (see [`ray_origin`]) from `distance` along `direction`
-    /// (unit): the product of `transmittance`, 0 to 1, over all surfaces in between, in any order. Infinitely far for a
-    /// directional light. A ray exactly through an edge that two triangles share meets both.
+    /// (unit): the product of what all surfaces in between let pass, in any order. Infinitely far for a directional light.
+    /// A ray exactly through an edge that two triangles share meets both.
     #[must_use]
-    pub fn transmitted(
-        &self,
-        origin: Vec3,
-        direction: Vec3,
-        distance: f32,
-        transmittance: impl Fn(u32) -> Vec3,
-    ) -> Vec3 {
+    pub fn transmitted(&self, origin: Vec3, direction: Vec3, distance: f32) -> Vec3 {
         let watertight = WatertightRay::new(origin, direction);
         let mut product = Vec3::ONE;
         any_hit(
@@ -298,7 +310,7 @@ impl Mesh {
                     && t < distance
                     && self.is_solid(i, barycentric)
                 {
-                    product *= transmittance(i);
+                    product *= self.transmittance.as_ref().map_or(Vec3::ZERO, |shares| shares[i as usize]);
                 }
                 product == Vec3::ZERO
             },

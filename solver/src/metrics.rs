@@ -1,10 +1,12 @@
 //! How wrong baked planes are against the traced reference.
+//!
+//! Visibility has three colours where surfaces let light pass: `|V~-V|` is the mean over them.
 
 use crate::{
     pair_table::{LightRows, PairTable},
     plane::BakedSet,
     shade::{set_rows, visibility},
-    visibility::{LightPairs, Pairs},
+    visibility::{LightPairs, Pairs, mean},
 };
 use glam::Vec3;
 use rayon::prelude::*;
@@ -49,19 +51,16 @@ pub(crate) struct LightError {
 }
 
 impl LightError {
-    fn add(&mut self, vote: f32, predicted: f32) {
-        let (vote, predicted) = (f64::from(vote), f64::from(predicted));
-        if vote > 0.0 {
-            self.missed += vote * predicted;
-        } else {
-            self.false_ -= vote * (1.0 - predicted);
-        }
+    fn add(&mut self, weight: f32, arrives: Vec3, predicted: Vec3) {
+        let (weight, wrong) = (f64::from(weight), predicted - arrives);
+        self.missed += weight * f64::from(mean(wrong.max(Vec3::ZERO)));
+        self.false_ += weight * f64::from(mean((-wrong).max(Vec3::ZERO)));
     }
 
     /// Sums up what `predicted`, the visibility 0..1 of a pair, gets wrong.
-    pub(crate) fn of(light: &LightPairs, predicted: impl Fn(usize) -> f32) -> Self {
+    pub(crate) fn of(light: &LightPairs, predicted: impl Fn(usize) -> Vec3) -> Self {
         let mut error = Self::default();
-        light.vote.iter().enumerate().for_each(|(i, &vote)| error.add(vote, predicted(i)));
+        (0..light.len()).for_each(|i| error.add(light.vote[i].abs(), light.arriving(i), predicted(i)));
         error
     }
 }
@@ -96,7 +95,8 @@ pub fn measure_tables(set: &BakedSet, tables: &[PairTable]) -> Metrics {
         for (table, list) in tables.iter().zip(lists) {
             let LightRows { start, end, .. } = table.lights[k];
             for i in start..end {
-                error.add(table.vote[i], visibility(&set.planes, &rows, list, table.point(i)));
+                let predicted = visibility(&set.planes, &rows, list, table.point(i));
+                error.add(table.vote[i].abs(), table.arriving(i), predicted);
             }
         }
         error

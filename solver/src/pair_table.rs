@@ -5,9 +5,13 @@
 //! as the search of whole models had them, hid most of the over-fitting: with 384 lights in 64 sections the held-out
 //! error was 0.058 on new receivers, 0.069 under new lights and 0.049 on the training pairs.
 
-use crate::{sampling::uniform, visibility::Pairs};
+use crate::{
+    sampling::uniform,
+    visibility::{Pairs, arriving, taken},
+};
 use glam::Vec3;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// The rows of one light in a [`PairTable`].
 #[derive(Clone, Copy, Debug)]
@@ -35,6 +39,8 @@ pub struct PairTable {
     pub z: Vec<f32>,
     /// `+w` where blocked, `-w` where lit.
     pub vote: Vec<f32>,
+    /// The share of each linear colour that arrives; empty for an opaque model.
+    pub arrives: Vec<Vec3>,
     /// Index of the receiver.
     pub receiver: Vec<u32>,
     /// Rows by light, sorted by direction.
@@ -92,6 +98,7 @@ impl PairTable {
             table.y.extend(&light.y);
             table.z.extend(&light.z);
             table.vote.extend(&light.vote);
+            table.arrives.extend(&light.arrives);
             table.receiver.extend(&light.receiver);
             table.pad(start);
             let end = table.len();
@@ -108,6 +115,9 @@ impl PairTable {
             column.extend(std::iter::repeat_n(column.last().copied().unwrap_or_default(), count));
         }
         self.vote.extend(std::iter::repeat_n(0.0, count));
+        if !self.arrives.is_empty() {
+            self.arrives.extend(std::iter::repeat_n(Vec3::ONE, count));
+        }
         self.receiver.extend(std::iter::repeat_n(self.receiver.last().copied().unwrap_or_default(), count));
     }
 
@@ -120,6 +130,7 @@ impl PairTable {
             self.z.push(p.z);
         }
         self.vote.extend(&from.vote[rows.start..rows.end]);
+        self.arrives.extend(from.arrives.get(rows.start..rows.end).unwrap_or_default());
         self.receiver.extend(from.receiver[rows.start..rows.end].iter().map(|receiver| receiver + first as u32));
         self.push_light(LightRows { start, end: self.len(), ..rows });
     }
@@ -177,12 +188,36 @@ impl PairTable {
         self.vote.is_empty()
     }
 
-    /// Sum of the weights of blocked pairs, and of all.
+    /// Sums of w (1 - V), V the mean of the colours, and of w.
     #[must_use]
     pub fn weights(&self) -> (f64, f64) {
-        self.vote.iter().fold((0.0, 0.0), |(shadow, total), &vote| {
-            (shadow + f64::from(vote.max(0.0)), total + f64::from(vote.abs()))
+        self.vote.iter().enumerate().fold((0.0, 0.0), |(shadow, total), (i, &vote)| {
+            (shadow + taken(&self.vote, &self.arrives, i), total + f64::from(vote.abs()))
         })
+    }
+
+    /// The share of each colour that arrives of pair `i`.
+    #[must_use]
+    pub fn arriving(&self, i: usize) -> Vec3 {
+        arriving(&self.vote, &self.arrives, i)
+    }
+
+    /// Does some pair lose a part of the light and keep another?
+    #[must_use]
+    pub fn has_tints(&self) -> bool {
+        self.arrives.iter().any(|v| *v != Vec3::ZERO && *v != Vec3::ONE)
+    }
+
+    /// The pairs with the votes by which planes are searched: where something is kept, what is lost of the light. With
+    /// whole votes a propeller's faint disc (a twelfth is lost) was worth as many planes as a wall.
+    #[must_use]
+    pub fn by_loss(&self) -> Cow<'_, Self> {
+        if !self.has_tints() {
+            return Cow::Borrowed(self);
+        }
+        let vote =
+            |i: usize| if self.vote[i] > 0.0 { taken(&self.vote, &self.arrives, i) as f32 } else { self.vote[i] };
+        Cow::Owned(Self { vote: (0..self.len()).map(vote).collect(), ..self.clone() })
     }
 
     /// Receiver position of pair `i`.
@@ -203,6 +238,7 @@ impl PairTable {
                     out.y.push(self.y[i]);
                     out.z.push(self.z[i]);
                     out.vote.push(vote);
+                    out.arrives.extend(self.arrives.get(i));
                     out.receiver.push(self.receiver[i]);
                 }
             }

@@ -110,6 +110,9 @@ pub fn distinct<'a>(textures: impl IntoIterator<Item = &'a OccluderTexture>) -> 
     (found, numbers)
 }
 
+/// The tint of a plane that lets nothing pass where it blocks.
+pub const OPAQUE: [u8; 3] = [255; 3];
+
 /// One plane, ready to cast.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BakedPlane {
@@ -117,6 +120,8 @@ pub struct BakedPlane {
     pub plane: ShadowPlane,
     /// What it blocks.
     pub texture: OccluderTexture,
+    /// The share of each linear colour that it takes where its texture blocks, in 255ths.
+    pub tint: [u8; 3],
     /// Which receivers it serves.
     pub side: Side,
     /// A receiver nearer than this along the ray is not shadowed, unit space.
@@ -176,6 +181,12 @@ impl BakedSet {
     #[must_use]
     pub fn ground_section(&self) -> Option<(Ground, u32)> {
         self.ground.map(|ground| (ground, self.model_sections() as u32))
+    }
+
+    /// Does some plane let light pass where it blocks?
+    #[must_use]
+    pub fn is_tinted(&self) -> bool {
+        self.planes.iter().any(|baked| baked.tint != OPAQUE)
     }
 
     /// Bytes of the textures, one a texel; shared ones count once.

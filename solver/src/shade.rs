@@ -191,17 +191,29 @@ pub fn set_rows(set: &BakedSet, l: Vec3) -> Vec<Option<PlaneRows>> {
     set.planes.iter().map(|baked| plane_rows(&baked.plane, baked.side, l)).collect()
 }
 
-/// Predicted visibility V~ in 0..1 of a receiver at `p` under a directional light: the product over the planes of
-/// its section's `list` of `1 - T(a, b)`, left as soon as one plane blocks. `rows` is aligned with `planes`.
+/// What a plane leaves of the light `v`, per colour, where its texture blocks the share `blocked`.
 #[must_use]
-pub fn visibility(planes: &[BakedPlane], rows: &[Option<PlaneRows>], list: &[u32], p: Vec3) -> f32 {
-    let mut v = 1.0;
+pub fn dimmed(v: Vec3, baked: &BakedPlane, blocked: f32) -> Vec3 {
+    v * (1.0 - blocked * share(baked.tint))
+}
+
+/// A tint as shares.
+#[must_use]
+pub fn share(tint: [u8; 3]) -> Vec3 {
+    Vec3::from_array(tint.map(|byte| f32::from(byte) / 255.0))
+}
+
+/// Predicted visibility V~ in 0..1, per colour, of a receiver at `p` under a directional light: the product over the
+/// planes of its section's `list` of `1 - T(a, b) tint`, left as soon as nothing is left. `rows` is aligned with `planes`.
+#[must_use]
+pub fn visibility(planes: &[BakedPlane], rows: &[Option<PlaneRows>], list: &[u32], p: Vec3) -> Vec3 {
+    let mut v = Vec3::ONE;
     for &index in list {
         let (baked, rows) = (&planes[index as usize], &rows[index as usize]);
         let Some(rows) = rows else { continue };
         if let Some((a, b)) = crossing(rows, baked.bias, p) {
-            v *= 1.0 - sample(&baked.texture, a, b);
-            if v <= 0.0 {
+            v = dimmed(v, baked, sample(&baked.texture, a, b));
+            if v == Vec3::ZERO {
                 break;
             }
         }
@@ -239,21 +251,23 @@ pub fn visibility_soft(
     (rows, softening): (&[Option<PlaneRows>], &[f32]),
     list: &[u32],
     p: Vec3,
-) -> f32 {
+) -> Vec3 {
     let blocked = |index: usize| {
         let (baked, rows, p) = (&planes[index], rows[index].as_ref()?, p.extend(1.0));
         let (a, b, s) = (rows.a.dot(p), rows.b.dot(p), rows.s.dot(p));
-        (s > baked.bias).then(|| sample_soft(&baked.texture, a, b, spread(softening[index], s)))
+        (s > baked.bias).then(|| (baked, sample_soft(&baked.texture, a, b, spread(softening[index], s))))
     };
-    list.iter().filter_map(|&index| blocked(index as usize)).fold(1.0, |v, blocked| v * (1.0 - blocked))
+    let blocking = list.iter().filter_map(|&index| blocked(index as usize));
+    blocking.fold(Vec3::ONE, |v, (baked, blocked)| dimmed(v, baked, blocked))
 }
 
 /// Predicted visibility of a receiver at `p` under a point light at `c`; the list is that of the direction from the
 /// model's middle to the light.
 #[must_use]
-pub fn visibility_point_light(planes: &[BakedPlane], list: &[u32], c: Vec3, p: Vec3) -> f32 {
-    list.iter().map(|&index| &planes[index as usize]).fold(1.0, |v, baked| match crossing_point_light(baked, c, p) {
-        Some((a, b)) if v > 0.0 => v * (1.0 - sample(&baked.texture, a, b)),
+pub fn visibility_point_light(planes: &[BakedPlane], list: &[u32], c: Vec3, p: Vec3) -> Vec3 {
+    let planes = list.iter().map(|&index| &planes[index as usize]);
+    planes.fold(Vec3::ONE, |v, baked| match crossing_point_light(baked, c, p) {
+        Some((a, b)) if v != Vec3::ZERO => dimmed(v, baked, sample(&baked.texture, a, b)),
         _ => v,
     })
 }

@@ -132,7 +132,7 @@ pub fn measure(mesh: &Mesh, receivers: &Receivers, pairs: &Pairs, size: usize) -
         let map = ShadowMap::draw(mesh, light.light, size);
         LightError::of(light, |i| {
             let normal = receivers.normals[light.receiver[i] as usize];
-            if map.blocks(light.point(i), normal) { 0.0 } else { 1.0 }
+            if map.blocks(light.point(i), normal) { Vec3::ZERO } else { Vec3::ONE }
         })
     })
 }

@@ -13,7 +13,7 @@ use crate::{
     mesh::{Mesh, ray_origin},
     plane::{Ground, PlacedPlane, ShadowPlane, Side},
     receivers::Receivers,
-    visibility::{LightPairs, Pairs},
+    visibility::{LightPairs, Pairs, mean},
 };
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
@@ -173,15 +173,16 @@ pub fn measure(mesh: &Mesh, (receivers, pairs): (&Receivers, &Pairs), mirror: Mi
     let of_light = |light: &LightPairs| {
         let l = mirror.vector(light.light);
         let mut sums = Sums::default();
-        let pairs = light.vote.iter().zip(&light.receiver).filter(|(_, r)| (**r as usize).is_multiple_of(stride));
-        for (&vote, &receiver) in pairs {
+        let pairs = light.vote.iter().zip(&light.receiver).enumerate();
+        for (i, (&vote, &receiver)) in pairs.filter(|(_, (_, r))| (**r as usize).is_multiple_of(stride)) {
             let weight = f64::from(vote.abs());
             sums.total += weight;
             match images[receiver as usize / stride] {
                 None => sums.unmatched += weight,
                 Some(origin) => {
                     sums.shadow += f64::from(vote.max(0.0));
-                    sums.wrong += if mesh.is_blocked(origin, l) == (vote > 0.0) { 0.0 } else { weight };
+                    let wrong = mesh.transmitted(origin, l, f32::INFINITY) - light.arriving(i);
+                    sums.wrong += weight * f64::from(mean(wrong.abs()));
                 }
             }
         }

@@ -3,6 +3,9 @@
 //! Out: per light, the receivers that face it, structure-of-arrays, each with a signed *vote*: its weight, positive
 //! where the light is blocked, negative where it is not. A texel of an occluder texture should block exactly where
 //! the votes of the pairs whose rays cross it sum to more than zero; everything later works on these four columns.
+//!
+//! Where surfaces let light pass, a fifth column says what arrives. A pair of which anything is taken counts as blocked;
+//! how much a plane takes is decided with the lists.
 
 use crate::{mesh::Mesh, receivers::Receivers, sampling::uniform};
 use glam::Vec3;
@@ -23,6 +26,8 @@ pub struct LightPairs {
     pub receiver: Vec<u32>,
     /// `+w` where blocked, `-w` where lit; `w = area x exposure x n.l x solid angle / rate`.
     pub vote: Vec<f32>,
+    /// The share V of each linear colour that arrives, 0 to 1; empty for an opaque model, where the vote says it all.
+    pub arrives: Vec<Vec3>,
 }
 
 /// All pairs of a set of receivers and lights.
@@ -30,7 +35,7 @@ pub struct LightPairs {
 pub struct Pairs {
     /// One entry a light.
     pub lights: Vec<LightPairs>,
-    /// Sum of w over blocked pairs.
+    /// Sum of w (1 - V) over all pairs, V the mean of the colours.
     pub shadow_weight: f64,
     /// Sum of w over all pairs.
     pub total_weight: f64,
@@ -55,6 +60,12 @@ impl LightPairs {
     #[must_use]
     pub fn point(&self, i: usize) -> Vec3 {
         Vec3::new(self.x[i], self.y[i], self.z[i])
+    }
+
+    /// The share of each colour that arrives of pair `i`.
+    #[must_use]
+    pub fn arriving(&self, i: usize) -> Vec3 {
+        arriving(&self.vote, &self.arrives, i)
     }
 
     fn push(&mut self, p: Vec3, receiver: u32, vote: f32) {
@@ -107,11 +118,29 @@ pub fn trace_drawn(
     };
     let lights: Vec<LightPairs> = lights.par_iter().enumerate().map(of_light).collect();
     let (mut shadow_weight, mut total_weight) = (0.0, 0.0);
-    for vote in lights.iter().flat_map(|l| &l.vote) {
-        shadow_weight += f64::from(vote.max(0.0));
-        total_weight += f64::from(vote.abs());
+    for light in &lights {
+        for (i, vote) in light.vote.iter().enumerate() {
+            shadow_weight += taken(&light.vote, &light.arrives, i);
+            total_weight += f64::from(vote.abs());
+        }
     }
     Pairs { lights, shadow_weight, total_weight, receivers: receivers.points.len() }
+}
+
+/// The share of each colour that arrives of pair `i` of two columns, `arrives` empty for an opaque model.
+pub(crate) fn arriving(vote: &[f32], arrives: &[Vec3], i: usize) -> Vec3 {
+    arrives.get(i).copied().unwrap_or(Vec3::splat(f32::from(u8::from(vote[i] <= 0.0))))
+}
+
+/// `w (1 - V)` of pair `i`.
+pub(crate) fn taken(vote: &[f32], arrives: &[Vec3], i: usize) -> f64 {
+    let share = arrives.get(i).map_or(1.0, |v| 1.0 - mean(*v));
+    f64::from(vote[i].max(0.0) * share)
+}
+
+/// Of three colours.
+pub(crate) fn mean(colors: Vec3) -> f32 {
+    colors.element_sum() / 3.0
 }
 
 /// Traces the pairs of one light for which `draw(receiver)` gives the rate at which they were drawn.
@@ -121,8 +150,8 @@ fn trace_light(
     (light, solid_angle): (Vec3, f32),
     draw: impl Fn(usize) -> Option<f32>,
 ) -> LightPairs {
-    let (x, y, z, receiver, vote) = Default::default();
-    let mut pairs = LightPairs { light, x, y, z, receiver, vote };
+    let (x, y, z, receiver, vote, arrives) = Default::default();
+    let mut pairs = LightPairs { light, x, y, z, receiver, vote, arrives };
     for (i, normal) in receivers.normals.iter().enumerate() {
         let cosine = normal.dot(light);
         if cosine <= 0.0 {
@@ -130,7 +159,14 @@ fn trace_light(
         }
         let Some(rate) = draw(i) else { continue };
         let vote = receivers.weights[i] * cosine * solid_angle / rate;
-        let blocked = mesh.is_blocked(receivers.origins[i], light);
+        let origin = receivers.origins[i];
+        let blocked = if mesh.is_opaque() {
+            mesh.is_blocked(origin, light)
+        } else {
+            let arrives = mesh.transmitted(origin, light, f32::INFINITY);
+            pairs.arrives.push(arrives);
+            arrives != Vec3::ONE
+        };
         pairs.push(receivers.points[i], i as u32, if blocked { vote } else { -vote });
     }
     pairs

@@ -93,7 +93,15 @@ fn tiny(seed: u64, planes: usize) -> (PairTable, Vec<PoolPlane>) {
 
 fn empty(light: Vec3) -> LightPairs {
     let column = Vec::new;
-    LightPairs { light, x: column(), y: column(), z: column(), receiver: Vec::new(), vote: column() }
+    LightPairs {
+        light,
+        x: column(),
+        y: column(),
+        z: column(),
+        receiver: Vec::new(),
+        vote: column(),
+        arrives: Vec::new(),
+    }
 }
 
 /// `[plane][pair]`: the texel that a pair crosses, if any.

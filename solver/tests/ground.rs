@@ -167,7 +167,7 @@ fn one_plane_casts_the_shadow_of_a_plate_on_the_ground() {
             let over = p - middle + l * (height / l.y);
             let blocked = over.x.abs().max(over.z.abs()) < half;
             dark += usize::from(blocked);
-            wrong += usize::from((visibility(&set.planes, &rows, list, p) < 0.5) != blocked);
+            wrong += usize::from((visibility(&set.planes, &rows, list, p).x < 0.5) != blocked);
         }
         assert!(dark > 1_000 && wrong * 25 < dark, "{l}: {wrong} of {dark} wrong");
     }
@@ -265,7 +265,7 @@ fn a_mirrored_ground_stays_one_section() {
         if in_the_plane(l) || in_the_plane(image) {
             continue;
         }
-        let shadow = |l: Vec3, p: Vec3| visibility(&set.planes, &set_rows(&set, l), &set.lists(l)[2], p);
+        let shadow = |l: Vec3, p: Vec3| visibility(&set.planes, &set_rows(&set, l), &set.lists(l)[2], p).x;
         let at = (r2(8, i) - 0.5) * 3.0;
         let p = Vec3::new(at.x, Ground::below(&mesh).height, at.y);
         assert_eq!(shadow(l, p), shadow(image, mirror.point(p)), "{p} under {l}");

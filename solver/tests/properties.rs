@@ -12,7 +12,7 @@ use shadowfit_solver::{
     mesh::{Mesh, Sides, Soup},
     metrics::{Metrics, measure_tables},
     pair_table::PairTable,
-    plane::{BakedPlane, BakedSet, Encoding, OccluderTexture, ShadowPlane, Side},
+    plane::{BakedPlane, BakedSet, Encoding, OPAQUE, OccluderTexture, ShadowPlane, Side},
     search::{BIAS, Found, Verdict, search},
     sections::{self, TraceOptions},
     visibility::Pairs,
@@ -199,7 +199,7 @@ fn threads_do_not_matter_to_sections() {
 /// Every bit of the planes.
 fn bytes(set: &BakedSet) -> Vec<u8> {
     let mut out = Vec::new();
-    for BakedPlane { plane, texture, side, bias } in &set.planes {
+    for BakedPlane { plane, texture, side, bias, .. } in &set.planes {
         for v in [plane.origin, plane.u, plane.v] {
             out.extend(v.to_array().iter().flat_map(|c| c.to_bits().to_le_bytes()));
         }
@@ -216,6 +216,7 @@ fn lids(coverage: u8) -> BakedSet {
     let lid = |y: f32| BakedPlane {
         plane: ShadowPlane { origin: Vec3::new(-500.0, y, -500.0), u: Vec3::Z * 1e3, v: Vec3::X * 1e3 },
         texture: OccluderTexture { width: 3, height: 3, encoding: Encoding::Coverage, texels: vec![coverage; 9] },
+        tint: OPAQUE,
         side: Side::Both,
         bias: BIAS,
     };

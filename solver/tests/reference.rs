@@ -270,13 +270,12 @@ fn the_transmitted_share_is_the_product_over_all_surfaces_up_to_the_light() {
     };
     let plates: Vec<_> = (0..8).map(plate).collect();
     let parts: Vec<_> = plates.iter().map(|plate| (plate, Sides::Front)).collect();
-    let mesh = Mesh::new(&soup(&parts)).unwrap();
     let of_plate = |plate: u32| match plate {
         7 => Vec3::new(0.5, 0.25, 0.0),
         even if even % 2 == 0 => Vec3::new(1.0, 0.5, 0.5),
         _ => Vec3::new(0.25, 0.125, 0.125),
     };
-    let transmittance = |triangle: u32| of_plate(mesh.source[triangle as usize] / 2);
+    let mesh = Mesh::new(&soup(&parts)).unwrap().with_transmittance(|triangle| of_plate(triangle as u32 / 2));
     for i in 0..2_000 {
         let x = 0.95 * (2.0 * uniform(61, i) - 1.0);
         let z = 0.95 * (2.0 * uniform(62, i) - 1.0);
@@ -289,7 +288,7 @@ fn the_transmitted_share_is_the_product_over_all_surfaces_up_to_the_light() {
                 direction.y > 0.0 && height < end && x.abs().max(z.abs()) < 1.0 - height
             };
             let expected: Vec3 = (0..8).filter(is_met).map(of_plate).product();
-            assert_eq!(mesh.transmitted(p, direction, reach, transmittance), expected, "({x}, {z}) up to {reach}");
+            assert_eq!(mesh.transmitted(p, direction, reach), expected, "({x}, {z}) up to {reach}");
         }
     }
 }

@@ -5,7 +5,7 @@ mod scenes;
 use glam::{DVec3, Vec3};
 use scenes::unit_vector;
 use shadowfit_solver::{
-    plane::{ActiveLists, BakedPlane, BakedSet, Encoding, OccluderTexture, SDF_BORDER, ShadowPlane, Side},
+    plane::{ActiveLists, BakedPlane, BakedSet, Encoding, OPAQUE, OccluderTexture, SDF_BORDER, ShadowPlane, Side},
     sampling::uniform,
     shade::{EDGE_ON, crossing, crossing_point_light, plane_rows, sample, visibility, visibility_point_light},
 };
@@ -37,7 +37,7 @@ fn exact(plane: &ShadowPlane, l: Vec3, p: Vec3) -> (f64, f64, f64) {
 
 fn full_texture(plane: ShadowPlane, side: Side) -> BakedPlane {
     let texture = OccluderTexture { width: 3, height: 3, encoding: Encoding::Coverage, texels: vec![255; 9] };
-    BakedPlane { plane, texture, side, bias: 1e-3 }
+    BakedPlane { plane, texture, tint: OPAQUE, side, bias: 1e-3 }
 }
 
 #[test]
@@ -95,15 +95,15 @@ fn edge_on_and_broken_planes_cast_nothing() {
     for (k, plane) in broken.into_iter().enumerate() {
         let baked = [full_texture(plane, Side::Both)];
         let rows = [plane_rows(&plane, Side::Both, l)];
-        assert_eq!(visibility(&baked, &rows, &[0], p), 1.0, "broken plane {k}");
-        assert_eq!(visibility_point_light(&baked, &[0], p + l, p), 1.0, "broken plane {k}, point light");
+        assert_eq!(visibility(&baked, &rows, &[0], p).x, 1.0, "broken plane {k}");
+        assert_eq!(visibility_point_light(&baked, &[0], p + l, p).x, 1.0, "broken plane {k}, point light");
     }
     // The sound plane does block there, and a broken light or receiver is lit.
     let baked = [full_texture(plane, Side::Both)];
-    assert_eq!(visibility(&baked, &[plane_rows(&plane, Side::Both, l)], &[0], p), 0.0);
-    assert_eq!(visibility(&baked, &[plane_rows(&plane, Side::Both, nan)], &[0], p), 1.0);
-    assert_eq!(visibility(&baked, &[plane_rows(&plane, Side::Both, l)], &[0], nan), 1.0);
-    assert_eq!(visibility_point_light(&baked, &[0], nan, p), 1.0);
+    assert_eq!(visibility(&baked, &[plane_rows(&plane, Side::Both, l)], &[0], p).x, 0.0);
+    assert_eq!(visibility(&baked, &[plane_rows(&plane, Side::Both, nan)], &[0], p).x, 1.0);
+    assert_eq!(visibility(&baked, &[plane_rows(&plane, Side::Both, l)], &[0], nan).x, 1.0);
+    assert_eq!(visibility_point_light(&baked, &[0], nan, p).x, 1.0);
 }
 
 #[test]
@@ -124,9 +124,9 @@ fn sides_and_bias_choose_the_receivers() {
         for (side, expected) in [(Side::Both, both), (Side::Front, front), (Side::Back, back)] {
             let baked = [full_texture(plane, side)];
             let rows = [plane_rows(&plane, side, light)];
-            assert_eq!(visibility(&baked, &rows, &[0], p), expected, "{side:?} y = {y} light {light}");
+            assert_eq!(visibility(&baked, &rows, &[0], p).x, expected, "{side:?} y = {y} light {light}");
             assert_eq!(
-                visibility_point_light(&baked, &[0], p + light * 5.0, p),
+                visibility_point_light(&baked, &[0], p + light * 5.0, p).x,
                 expected,
                 "{side:?} y = {y} point light"
             );
@@ -221,11 +221,11 @@ fn planes_multiply() {
     let l = DVec3::new(0.1, 1.0, 0.05).normalize().as_vec3();
     let rows: Vec<_> = planes.iter().map(|b| plane_rows(&b.plane, b.side, l)).collect();
     for (y, expected) in [(-0.2, 0.0), (0.1, 0.0), (0.7, 1.0)] {
-        assert!((visibility(&planes, &rows, &[0, 1, 2], Vec3::Y * y) - expected).abs() < 1e-6, "y = {y}");
+        assert!((visibility(&planes, &rows, &[0, 1, 2], Vec3::Y * y).x - expected).abs() < 1e-6, "y = {y}");
     }
-    let v = visibility(&planes, &rows, &[0, 1], Vec3::Y * -0.2);
+    let v = visibility(&planes, &rows, &[0, 1], Vec3::Y * -0.2).x;
     assert!((v - 0.8 * 0.6).abs() < 1e-6, "{v}");
-    assert!((visibility_point_light(&planes, &[1, 0], l * 3.0, Vec3::Y * -0.2) - 0.8 * 0.6).abs() < 1e-6);
+    assert!((visibility_point_light(&planes, &[1, 0], l * 3.0, Vec3::Y * -0.2).x - 0.8 * 0.6).abs() < 1e-6);
 }
 
 /// A distance field is read as coverage and cut at its border, so it has no grey.

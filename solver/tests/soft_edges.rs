@@ -3,7 +3,7 @@
 use glam::Vec3;
 use shadowfit_solver::{
     field::{VoteGrid, VotedShape},
-    plane::{BakedPlane, Encoding, SDF_TEXELS, ShadowPlane, Side},
+    plane::{BakedPlane, Encoding, OPAQUE, SDF_TEXELS, ShadowPlane, Side},
     shade::{PlaneRows, horizon, plane_rows, softening, visibility, visibility_soft},
 };
 use std::f32::consts::{FRAC_1_SQRT_2, PI};
@@ -22,7 +22,7 @@ fn baked(encoding: Encoding, blocks: impl Fn(f32) -> bool) -> BakedPlane {
     let grid = VoteGrid { votes: &votes, width: cells, height: cells };
     let texture = VotedShape::new(grid, 0).texture(encoding, (TEXELS, TEXELS));
     let plane = ShadowPlane { origin: Vec3::new(-0.5, 0.0, -0.5), u: Vec3::X, v: Vec3::Z };
-    BakedPlane { plane, texture, side: Side::Both, bias: 1e-4 }
+    BakedPlane { plane, texture, tint: OPAQUE, side: Side::Both, bias: 1e-4 }
 }
 
 /// Share of a disc of radius 1 beyond a line at distance `d` from its middle.
@@ -47,12 +47,12 @@ impl Lit {
     /// Visibility of the receiver at distance `s` whose ray crosses the plane at (x, z).
     fn at(&self, x: f32, z: f32, s: f32) -> f32 {
         let p = Vec3::new(x, 0.0, z) - s * self.l;
-        visibility_soft(std::slice::from_ref(&self.baked), (&[self.rows], &[self.softening]), &[0], p)
+        visibility_soft(std::slice::from_ref(&self.baked), (&[self.rows], &[self.softening]), &[0], p).x
     }
 
     fn hard(&self, x: f32, z: f32, s: f32) -> f32 {
         let p = Vec3::new(x, 0.0, z) - s * self.l;
-        visibility(std::slice::from_ref(&self.baked), &[self.rows], &[0], p)
+        visibility(std::slice::from_ref(&self.baked), &[self.rows], &[0], p).x
     }
 
     /// From where a tenth of the light is seen to where nine tenths are.

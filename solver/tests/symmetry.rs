@@ -250,8 +250,8 @@ fn differences(set: &BakedSet, mirror: &Mirror) -> (f32, f32) {
         let rows = [l, image].map(|l| set_rows(set, l));
         for (section, k) in (0..set.sections.len()).zip(0..) {
             let p = random(seed * 31 + k);
-            let near = visibility(&set.planes, &rows[0], &set.lists(l)[section], p);
-            let far = visibility(&set.planes, &rows[1], &set.lists(image)[section ^ 1], mirror.point(p));
+            let near = visibility(&set.planes, &rows[0], &set.lists(l)[section], p).x;
+            let far = visibility(&set.planes, &rows[1], &set.lists(image)[section ^ 1], mirror.point(p)).x;
             largest = largest.max((near - far).abs());
             sum += (near - far).abs();
         }

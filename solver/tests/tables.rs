@@ -181,7 +181,15 @@ fn a_gain_is_the_drop_of_the_error_where_both_folds_agree() {
 fn crossing_at(light: Vec3, pairs: &[(f32, f32)]) -> LightPairs {
     let (x, vote): (Vec<f32>, Vec<f32>) = pairs.iter().copied().unzip();
     let n = x.len();
-    LightPairs { light, x, y: vec![-0.5 * light.y; n], z: vec![0.0; n], receiver: vec![0; n], vote }
+    LightPairs {
+        light,
+        x,
+        y: vec![-0.5 * light.y; n],
+        z: vec![0.0; n],
+        receiver: vec![0; n],
+        vote,
+        arrives: Vec::new(),
+    }
 }
 
 #[test]

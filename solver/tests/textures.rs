@@ -5,7 +5,7 @@ use shadowfit_solver::{
     budget::{self, Allocation, BudgetOptions, Offers, Sizing},
     field::{VoteGrid, VotedShape, blocked_votes},
     lists::VotedPlane,
-    plane::{Encoding, OccluderTexture, PlacedPlane, ShadowPlane, Side},
+    plane::{Encoding, OPAQUE, OccluderTexture, PlacedPlane, ShadowPlane, Side},
     sampling::uniform,
 };
 
@@ -39,7 +39,8 @@ fn grid(votes: &[f32]) -> VoteGrid<'_> {
 
 fn plane(votes: [Vec<f32>; 2]) -> VotedPlane {
     let plane = ShadowPlane { origin: Vec3::ZERO, u: Vec3::X, v: Vec3::Y };
-    VotedPlane { placed: PlacedPlane { plane, side: Side::Both, bias: 0.01 }, width: CELLS, height: CELLS, votes }
+    let placed = PlacedPlane { plane, side: Side::Both, bias: 0.01 };
+    VotedPlane { placed, tint: OPAQUE, width: CELLS, height: CELLS, votes }
 }
 
 fn is_ring(i: usize, size: usize) -> bool {

@@ -7,7 +7,7 @@ use super::{AssetError, AssetRequest, Bounds, Channel, ModelGround, Rectangle, a
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 use serde_json::ser::{Formatter, Serializer};
-use shadowfit_solver::plane::{BakedSet, Encoding, SectionLists, Side};
+use shadowfit_solver::plane::{BakedSet, Encoding, OPAQUE, SectionLists, Side};
 use std::io::{self, Write};
 
 /// A direction may be longer or shorter than 1 by this much: numbers that a person wrote with three decimals pass, a
@@ -81,6 +81,9 @@ pub struct PlaneEntry {
     pub side: Side,
     /// A receiver nearer than this along the ray is not shadowed, metres.
     pub bias: f64,
+    /// The share of each linear colour that it takes where its texture blocks; without one, all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tint: Option<[f64; 3]>,
 }
 
 /// Which picture holds a texture: `{"index": 0}` in glTF, `{"uri": ".."}` in the sidecar.
@@ -126,6 +129,7 @@ impl Extension {
                 encoding: baked.texture.encoding,
                 side: baked.side,
                 bias,
+                tint: (baked.tint != OPAQUE).then(|| baked.tint.map(spelled)),
             });
         }
         let entry = |active: &shadowfit_solver::plane::ActiveLists| ActiveEntry {
@@ -152,6 +156,11 @@ impl Extension {
         out.push(b'\n');
         Ok(out)
     }
+}
+
+/// 255ths in the four digits that stand for them.
+fn spelled(byte: u8) -> f64 {
+    (f64::from(byte) / 255.0 * 1e4).round() / 1e4
 }
 
 /// The request's ground.

@@ -18,7 +18,7 @@ use glam::{DAffine3, DVec3};
 use image::{ImageFormat, ImageReader, RgbImage};
 use serde::Deserialize;
 use serde_json::Value;
-use shadowfit_solver::plane::{ActiveLists, Encoding, OccluderTexture, SectionLists, Side};
+use shadowfit_solver::plane::{ActiveLists, Encoding, OPAQUE, OccluderTexture, SectionLists, Side};
 use std::{collections::BTreeMap, io::Cursor, path::Path};
 
 /// A ground may rise by this much per metre and still be level: quaternions of f32 turn by 1e-7 too much.
@@ -156,7 +156,18 @@ fn read_plane(at: &At<'_>, atlases: &mut Atlases<'_>) -> Result<ModelPlane, Asse
     let channel: Channel = at.member("channel")?.parse()?;
     let atlas = atlases.get(&at.member("occluderTexture")?)?;
     let texture = crop(atlas, &at.member("region")?, (channel, encoding))?;
-    Ok(ModelPlane { rectangle, texture, side, bias })
+    let tint = at.optional("tint").map_or(Ok(OPAQUE), |tint| read_tint(&tint))?;
+    Ok(ModelPlane { rectangle, texture, tint, side, bias })
+}
+
+/// Shares of three colours, rounded to 255ths.
+fn read_tint(at: &At<'_>) -> Result<[u8; 3], AssetError> {
+    let shares: [f64; 3] = at.parse()?;
+    if shares.iter().all(|share| (0.0..=1.0).contains(share)) {
+        Ok(shares.map(|share| (255.0 * share).round() as u8))
+    } else {
+        Err(at.error("not three shares from 0 to 1".into()))
+    }
 }
 
 /// One channel of a region of an atlas.

@@ -65,12 +65,10 @@ pub enum Family {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Against {
-    /// Traced hard shadows.
+    /// Traced hard shadows, tinted by what lets light pass.
     Hard,
     /// Traced soft shadows of a distant light of some size.
     Soft,
-    /// Traced hard shadows of casters that let light pass.
-    Transmitted,
 }
 
 /// Sizes of shadow maps that are measured unfiltered.
@@ -239,7 +237,6 @@ impl Family {
     fn against(self) -> Against {
         match self {
             Self::SoftEdge | Self::SoftPlanar => Against::Soft,
-            Self::TransparentVolumes => Against::Transmitted,
             _ => Against::Hard,
         }
     }

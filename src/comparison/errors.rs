@@ -78,7 +78,7 @@ pub(super) fn measure(
             let shown = if view == 0 { Some(light_to_show(bench, world, &seen, options.lights)?) } else { None };
             for light in 0..options.lights {
                 progress(format!("errors: view {} of {}, light {}", view + 1, options.views, light + 1));
-                for against in [Against::Hard, Against::Soft, Against::Transmitted] {
+                for against in [Against::Hard, Against::Soft] {
                     let same = |setting: &Setting| setting.world.bare() == world && setting.against == against;
                     if !settings.iter().any(same) {
                         continue;
@@ -122,8 +122,7 @@ fn reference(
             (Against::Soft, Light::Directional { to_light }) => {
                 traced.soft_picture(&view, &AreaLight::distant(to_light, SOFT_HALF_ANGLE_RAD), SOFT_SAMPLES)
             }
-            (Against::Transmitted, _) => traced.transmitted_picture(&view),
-            _ => traced.picture(&view),
+            _ => traced.transmitted_picture(&view),
         }
     };
     let counts = if world.counts_ground() { traced.ground_seen(seen) } else { vec![true; seen.pixels()] };

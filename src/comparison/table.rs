@@ -216,7 +216,6 @@ fn against_name(against: Against) -> &'static str {
     match against {
         Against::Hard => "hard",
         Against::Soft => "soft",
-        Against::Transmitted => "transmitted",
     }
 }
 

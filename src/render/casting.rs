@@ -21,8 +21,8 @@ use shadowfit_solver::{
 /// One texel.
 type Texel = [u32; 4];
 
-/// Texels of a plane.
-const PLANE_TEXELS: usize = size_of::<CastingTexels>() / size_of::<Texel>();
+/// Texels of a plane without its tint, which has one more in sets where some plane lets light pass.
+const UNTINTED_TEXELS: usize = size_of::<CastingTexels>() / size_of::<Texel>();
 
 /// Texels of a row of the texture: 200 instances of the largest sets make some hundred rows, far below every adapter's
 /// limit of 2048 and up, and a row that is not used up wastes at most 16 KB.
@@ -35,6 +35,8 @@ struct Prepared {
     /// The plane's equation and the rows of its edges' duals.
     point_light: [Vec4; 3],
     slot: SlotTexel,
+    /// Share of each linear colour that it takes where it blocks, one byte each.
+    tint: u32,
 }
 
 /// The texture of what casts.
@@ -42,6 +44,7 @@ struct Prepared {
 pub(crate) struct Casting {
     planes: Vec<Prepared>,
     sections: usize,
+    plane_texels: usize,
     instance_texels: usize,
     texture: wgpu::Texture,
     pub view: wgpu::TextureView,
@@ -65,10 +68,12 @@ impl Casting {
                 directional: shade::CastingPlane::new(&baked.plane, baked.side),
                 point_light: [a, b, equation],
                 slot: SlotTexel::new(baked, slot),
+                tint: u32::from_le_bytes([baked.tint[0], baked.tint[1], baked.tint[2], 0]),
             }
         });
+        let plane_texels = UNTINTED_TEXELS + usize::from(set.is_tinted());
         let sections = set.sections.len();
-        let instance_texels = sections + 1 + PLANE_TEXELS * longest(set);
+        let instance_texels = sections + 1 + plane_texels * longest(set);
         let rows = (instances * instance_texels).div_ceil(ROW_TEXELS).max(1);
         let limit = gpu.limits().max_texture_dimension_2d;
         if rows > limit as usize {
@@ -90,6 +95,7 @@ impl Casting {
         Ok(Self {
             planes: planes.collect(),
             sections,
+            plane_texels,
             instance_texels,
             texture,
             view,
@@ -100,9 +106,13 @@ impl Casting {
     }
 
     /// The pipeline constants of planes.wgsl that tell where a texel is.
-    pub fn constants(&self) -> [(&'static str, f64); 3] {
-        let constants =
-            [("SECTIONS", self.sections), ("INSTANCE_TEXELS", self.instance_texels), ("ROW_TEXELS", ROW_TEXELS)];
+    pub fn constants(&self) -> [(&'static str, f64); 4] {
+        let constants = [
+            ("SECTIONS", self.sections),
+            ("PLANE_TEXELS", self.plane_texels),
+            ("INSTANCE_TEXELS", self.instance_texels),
+            ("ROW_TEXELS", ROW_TEXELS),
+        ];
         constants.map(|(name, value)| (name, value as f64))
     }
 
@@ -125,6 +135,7 @@ impl Casting {
     /// Computes the texels under `light` (world space) and sends them.
     pub fn update(&mut self, gpu: &Gpu, set: &BakedSet, placements: &[Placement], light: &Light) {
         let (planes, sections, stride) = (&self.planes, self.sections, self.instance_texels);
+        let plane_texels = self.plane_texels;
         let under = |plane: usize, light: &Light| match *light {
             Light::Directional { to_light } if self.light_radius_rad > 0.0 => {
                 let texels = planes[plane].under(light)?;
@@ -142,8 +153,11 @@ impl Casting {
                 let start = end;
                 for &plane in lists.get(section).map_or(&[][..], Vec::as_slice) {
                     if let Some(casting) = under(plane as usize, &light) {
-                        block[end..end + PLANE_TEXELS].copy_from_slice(bytemuck::cast_slice(&[casting]));
-                        end += PLANE_TEXELS;
+                        block[end..end + UNTINTED_TEXELS].copy_from_slice(bytemuck::cast_slice(&[casting]));
+                        if plane_texels > UNTINTED_TEXELS {
+                            block[end + UNTINTED_TEXELS] = [planes[plane as usize].tint, 0, 0, 0];
+                        }
+                        end += plane_texels;
                     }
                 }
                 let [start, end] = [start, end].map(|texel| (instance * stride + texel) as u32);

@@ -81,7 +81,7 @@ impl Primary {
         &self.hits
     }
 
-    /// Shades what the camera sees. `visibility` is asked only where the geometric normal faces the light.
+    /// Shades what the camera sees. `visibility`, per colour, is asked only where the geometric normal faces the light.
     ///
     /// # Errors
     /// [`RenderError::NeedsAdapter`] for [`Mode::Planes`].
@@ -90,7 +90,7 @@ impl Primary {
         (scene, mesh): (&Scene, &Mesh),
         mode: Mode,
         light: &Light,
-        visibility: impl Fn(&PrimaryHit) -> f32 + Sync,
+        visibility: impl Fn(&PrimaryHit) -> Vec3 + Sync,
     ) -> Result<image::RgbaImage, RenderError> {
         let background = match mode {
             Mode::Mask => Vec4::ZERO,
@@ -138,9 +138,9 @@ fn hit(mesh: &Mesh, (origin, direction): (Vec3, Vec3)) -> Option<PrimaryHit> {
 }
 
 /// Twin of `fs_mask`.
-fn mask(hit: &PrimaryHit, light: &Light, visibility: impl Fn(&PrimaryHit) -> f32) -> Vec4 {
+fn mask(hit: &PrimaryHit, light: &Light, visibility: impl Fn(&PrimaryHit) -> Vec3) -> Vec4 {
     if hit.normal.dot(light.towards(hit.p_unit)) > 0.0 {
-        Vec4::new(visibility(hit), 1.0, 1.0, 1.0)
+        Vec4::new(visibility(hit).dot(Vec3::splat(1.0 / 3.0)), 1.0, 1.0, 1.0)
     } else {
         Vec4::new(0.0, 0.0, 1.0, 1.0)
     }
@@ -151,7 +151,7 @@ fn shaded(
     (scene, mesh): (&Scene, &Mesh),
     hit: &PrimaryHit,
     light: &Light,
-    visibility: impl Fn(&PrimaryHit) -> f32,
+    visibility: impl Fn(&PrimaryHit) -> Vec3,
 ) -> Vec3 {
     let triangle = mesh.source[hit.triangle as usize] as usize;
     let weights = hit.barycentric;
@@ -162,7 +162,7 @@ fn shaded(
     let to_light = light.towards(hit.p_unit);
     let n_dot_l = n.dot(to_light.normalize_or_zero());
     let lit = n_dot_l > 0.0 && hit.normal.dot(to_light) > 0.0;
-    let direct = if lit { n_dot_l * visibility(hit) } else { 0.0 };
+    let direct = if lit { n_dot_l * visibility(hit) } else { Vec3::ZERO };
     base_color(scene, triangle, weights) * (AMBIENT + DIFFUSE * direct)
 }
 

@@ -109,10 +109,14 @@ impl OccluderPlanes {
     /// coordinates under them are not affine.
     ///
     /// # Errors
-    /// As of [`OccluderPlanes::new`], and [`RenderError::Unsupported`] where a section reads more than 4 planes.
+    /// As of [`OccluderPlanes::new`], and [`RenderError::Unsupported`] where a section reads more than 4 planes, or
+    /// some plane has a tint.
     pub fn per_vertex(stage: &Stage, set: &BakedSet) -> Result<Self, RenderError> {
         if choices(set).flatten().any(|list| list.len() > MOST_AT_VERTICES) {
             return Err(RenderError::Unsupported { technique: PER_VERTEX, feature: "lists of at most 4 planes" });
+        }
+        if set.is_tinted() {
+            return Err(RenderError::Unsupported { technique: PER_VERTEX, feature: "planes without tints" });
         }
         Self::with(stage, set, (0.0, Coordinates::PerVertex))
     }

@@ -83,7 +83,7 @@ impl RayTraced {
     /// # Errors
     /// As of [`Mesh::new`].
     pub fn new(scene: Scene, world: &Frame) -> Result<Self, MeshError> {
-        let mesh = Mesh::new(&scene.soup)?;
+        let mesh = scene.mesh()?;
         let scale = (world.radius / mesh.frame.radius) as f32;
         let offset = mesh.frame.unit_from_model(world.centre_model);
         Ok(Self { scene, mesh, scale, offset })
@@ -123,12 +123,12 @@ impl RayTraced {
     /// [`RenderError::NeedsAdapter`] for [`Mode::Planes`].
     pub fn picture(&self, view: &View) -> Result<image::RgbaImage, RenderError> {
         let light = self.moved(view.light);
-        let visibility = |hit: &PrimaryHit| f32::from(self.is_lit(hit, &light));
+        let visibility = |hit: &PrimaryHit| Vec3::splat(f32::from(self.is_lit(hit, &light)));
         view.primary.picture((&self.scene, &self.mesh), view.mode, &light, visibility)
     }
 
     /// Hard shadows of the view's light where materials let light through ([`Material::transmittance`]): the product over
-    /// all surfaces on the way, the mean of its colours. [`RayTraced::picture`] takes such materials for opaque. What the
+    /// all surfaces on the way, in masks the mean of its colours. [`RayTraced::picture`] takes such materials for opaque. What the
     /// camera would see through them is not drawn.
     ///
     /// [`Material::transmittance`]: crate::scene::Material::transmittance
@@ -137,11 +137,12 @@ impl RayTraced {
     /// [`RenderError::NeedsAdapter`] for [`Mode::Planes`].
     pub fn transmitted_picture(&self, view: &View) -> Result<image::RgbaImage, RenderError> {
         let light = self.moved(view.light);
-        let visibility = |hit: &PrimaryHit| self.transmitted(hit, &light).element_sum() / 3.0;
+        let visibility = |hit: &PrimaryHit| self.transmitted(hit, &light);
         view.primary.picture((&self.scene, &self.mesh), view.mode, &light, visibility)
     }
 
-    /// Soft shadows of `side` x `side` samples of an area light, in the place of the view's light.
+    /// Soft shadows of `side` x `side` samples of an area light, in the place of the view's light; materials let light
+    /// through as in [`RayTraced::transmitted_picture`].
     ///
     /// # Errors
     /// [`RenderError::NeedsAdapter`] for [`Mode::Planes`].
@@ -149,8 +150,8 @@ impl RayTraced {
         let samples: Vec<Light> =
             light.samples(side).into_iter().map(|position| self.moved(Light::Point { position })).collect();
         let visibility = |hit: &PrimaryHit| {
-            let lit = samples.iter().filter(|sample| self.is_lit(hit, sample)).count();
-            lit as f32 / samples.len() as f32
+            let arriving: Vec3 = samples.iter().map(|sample| self.transmitted(hit, sample)).sum();
+            arriving / samples.len() as f32
         };
         view.primary.picture((&self.scene, &self.mesh), view.mode, &self.moved(light.middle()), visibility)
     }
@@ -183,9 +184,6 @@ impl RayTraced {
         let origin = ray_origin(hit.p_unit, hit.normal);
         let to_light = light.towards(origin);
         let distance = if light.homogeneous().w == 0.0 { f32::INFINITY } else { to_light.length() };
-        self.mesh.transmitted(origin, to_light.normalize_or_zero(), distance, |triangle| {
-            let material = self.scene.material_of[self.mesh.source[triangle as usize] as usize];
-            self.scene.materials[material as usize].transmittance.map_or(Vec3::ZERO, Vec3::from_array)
-        })
+        self.mesh.transmitted(origin, to_light.normalize_or_zero(), distance)
     }
 }

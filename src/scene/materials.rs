@@ -113,7 +113,8 @@ impl<'a> Surfaces<'a> {
             None => AlphaMode::Opaque,
         };
         if mode == AlphaMode::Blend {
-            notices.add("blended materials", 1, "alphaMode BLEND: taken as opaque, and so it casts a full shadow");
+            let why = "alphaMode BLEND: drawn as opaque; its shadow has one tint, the mean over the texture";
+            notices.add("blended materials", 1, why);
         }
         let info = record.pbr_metallic_roughness.base_color_texture.as_ref();
         let info_pointer = format!("{pointer}/pbrMetallicRoughness/baseColorTexture");

@@ -8,7 +8,7 @@ use shadowfit::{
 };
 use shadowfit_solver::{
     mesh::Frame,
-    plane::{ActiveLists, BakedPlane, BakedSet, Encoding, OccluderTexture, ShadowPlane, Side},
+    plane::{ActiveLists, BakedPlane, BakedSet, Encoding, OPAQUE, OccluderTexture, ShadowPlane, Side},
 };
 use std::path::{Path, PathBuf};
 
@@ -72,6 +72,7 @@ pub fn planes(count: usize) -> Vec<BakedPlane> {
         BakedPlane {
             plane: ShadowPlane { origin, u, v },
             texture: texture(width, height, &mut numbers),
+            tint: [OPAQUE, [255, 0, 51], [128, 200, 254]][i % 3],
             side: [Side::Both, Side::Front, Side::Back][i % 3],
             bias: 1e-3 * i as f32,
         }

@@ -40,6 +40,22 @@ fn external_files_are_copied_beside_the_output() {
 }
 
 #[test]
+fn only_planes_that_let_light_pass_have_a_tint() {
+    let folders = Folders::new();
+    let input = folders.input("m.gltf", document("", "").as_bytes());
+    let written = folders.write(&folders.input("m.glb", &glb(&document("", ""), Some(&triangle()))), &planes(4));
+    let written = written.unwrap();
+    drop(input);
+    for path in [&written.model, &written.sidecar] {
+        let bytes = fs::read(path).unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        assert_eq!(text.matches("\"tint\"").count(), 2, "{}", path.display());
+        let tints: Vec<_> = read(path).unwrap().planes.iter().map(|plane| plane.tint).collect();
+        assert_eq!(tints, [[255; 3], [255, 0, 51], [128, 200, 254], [255; 3]]);
+    }
+}
+
+#[test]
 fn a_gltf_beside_its_output_keeps_its_files() {
     let folders = Folders::new();
     folders.input("sub folder/m.bin", &triangle());

@@ -6,7 +6,7 @@ use shadowfit_solver::{
     lights::LightDomain,
     mesh::{Mesh, Sides, Soup},
     metrics::measure,
-    plane::{BakedPlane, BakedSet, Encoding, OccluderTexture, ShadowPlane, Side},
+    plane::{BakedPlane, BakedSet, Encoding, OPAQUE, OccluderTexture, ShadowPlane, Side},
     receivers::{ReceiverOptions, sample},
     visibility::trace,
 };
@@ -83,7 +83,7 @@ fn lights_exactly_in_a_plane_neither_shadow_nor_break() {
     let pairs = trace(&mesh, &receivers, &lights, 1.0);
     assert!(pairs.lights.iter().any(|light| !light.is_empty()), "nothing is lit");
     for side in [Side::Both, Side::Front, Side::Back] {
-        let baked = BakedPlane { plane, texture: texture.clone(), side, bias: 0.0 };
+        let baked = BakedPlane { plane, texture: texture.clone(), tint: OPAQUE, side, bias: 0.0 };
         let measured = |planes| measure(&BakedSet::one_section(planes), &pairs, &vec![0; pairs.receivers]);
         let [with, without] = [measured(vec![baked]), measured(vec![])];
         assert!(with.shadow_error.is_finite() && with.false_ == 0.0, "{with:?}");

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec2, Vec3};
 use shadowfit::scene::{Material, Scene};
 use shadowfit_solver::{
     mesh::{Cutout, Sides},
-    plane::{BakedPlane, Encoding, OccluderTexture, ShadowPlane, Side},
+    plane::{BakedPlane, Encoding, OPAQUE, OccluderTexture, ShadowPlane, Side},
 };
 use std::{f32::consts::TAU, sync::Arc};
 
@@ -65,7 +65,7 @@ pub fn planes() -> Vec<BakedPlane> {
             let plane = ShadowPlane { origin: centre - 0.5 * (width * u + height * v), u: u * width, v: v * height };
             let texture = blobs(&mut random, 40 + 13 * i, 120 - 11 * i);
             let side = [Side::Both, Side::Front, Side::Back, Side::Both][i % 4];
-            BakedPlane { plane, texture, side, bias: 0.004 }
+            BakedPlane { plane, texture, tint: OPAQUE, side, bias: 0.004 }
         })
         .collect()
 }

@@ -164,7 +164,7 @@ fn twin(traced: &RayTraced, request: &FrameRequest, options: &VertexVisibilityOp
             let seen = &found.distinct[found.index_of[side] as usize];
             hit.barycentric[k] * if options.kept == Kept::BentNormal { seen.by_cone(l) } else { seen.by_harmonics(l) }
         };
-        sharpened((0..3).map(prediction).sum(), options.edge)
+        Vec3::splat(sharpened((0..3).map(prediction).sum(), options.edge))
     };
     let primary = Primary::trace(mesh, &request.camera, SIZE_PX, Antialias::Off).expect("traced");
     primary.picture((scene, mesh), Mode::Mask, &request.light, visibility).expect("drawn")
