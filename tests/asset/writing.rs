@@ -42,10 +42,8 @@ fn external_files_are_copied_beside_the_output() {
 #[test]
 fn only_planes_that_let_light_pass_have_a_tint() {
     let folders = Folders::new();
-    let input = folders.input("m.gltf", document("", "").as_bytes());
-    let written = folders.write(&folders.input("m.glb", &glb(&document("", ""), Some(&triangle()))), &planes(4));
-    let written = written.unwrap();
-    drop(input);
+    let input = folders.input("m.glb", &glb(&document("", ""), Some(&triangle())));
+    let written = folders.write(&input, &planes(4)).unwrap();
     for path in [&written.model, &written.sidecar] {
         let bytes = fs::read(path).unwrap();
         let text = String::from_utf8_lossy(&bytes);
