@@ -74,8 +74,8 @@ pub enum Against {
 /// Sizes of shadow maps that are measured unfiltered.
 const MAP_SIZES: [u32; 6] = [128, 256, 512, 1024, 2048, 4096];
 
-/// Sizes and kernels of filtered maps.
-const FILTERED: [(u32, u32); 4] = [(512, 2), (512, 5), (1024, 2), (1024, 5)];
+/// Sizes and kernels of filtered maps: those of the soft edge among them, to tell what they cost where shadows are hard.
+const FILTERED: [(u32, u32); 6] = [(512, 2), (512, 5), (1024, 2), (1024, 5), (1024, 9), (1024, 17)];
 
 /// Sizes of the maps of other techniques.
 const OTHER_SIZES: [u32; 3] = [256, 512, 1024];

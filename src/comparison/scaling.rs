@@ -33,8 +33,8 @@ const FILL_INSTANCES: usize = 10;
 
 /// A test ends before all frames are drawn where it has taken this long for each technique, seconds, and has drawn
 /// [`LEAST_FRAMES`]: hundreds of instances take seconds a frame where a CPU draws them.
-const SECONDS: f64 = 15.0;
-const LEAST_FRAMES: usize = 10;
+const SECONDS: f64 = 6.0;
+const LEAST_FRAMES: usize = 8;
 
 /// What a test makes scarce.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
