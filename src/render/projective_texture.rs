@@ -11,18 +11,15 @@
 
 use super::{
     FrameRequest, RenderError,
-    bindings::{SAMPLER, STORAGE, buffer, group, layout, texture},
+    bindings::{SAMPLER, texture},
     forward::{Forward, ForwardOptions},
     gpu::{CONSTANT_VISIBILITY, PROJECTIVE_TEXTURE},
-    light_map::LightMap,
+    light_map::{LightMaps, MOST_VIEWS},
     light_view::views,
     silhouette::{Silhouette, SilhouetteTarget, begin},
     stage::{Begin, Part, Stage, Targets},
     technique::{Cost, Technique},
-    view_matrices::per_instance,
 };
-use glam::Mat4;
-
 /// One byte.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
 /// The bilinear filter reaches this far, texels: views leave that much open around the casters.
@@ -41,12 +38,9 @@ pub struct ProjectiveTextureOptions {
 pub struct ProjectiveTexture {
     options: ProjectiveTextureOptions,
     silhouette: Silhouette,
-    matrices: wgpu::Buffer,
-    layout: wgpu::BindGroupLayout,
-    sampler: wgpu::Sampler,
+    maps: LightMaps,
     casters: Forward,
     ground: Forward,
-    map: Option<(LightMap, wgpu::BindGroup)>,
 }
 
 impl ProjectiveTexture {
@@ -56,35 +50,21 @@ impl ProjectiveTexture {
     /// A size beyond the adapter's limits.
     pub fn new(stage: &Stage, options: ProjectiveTextureOptions) -> Result<Self, RenderError> {
         let gpu = &stage.gpu;
-        LightMap::check_side(gpu, options.size_texels)?;
-        let fragment = wgpu::ShaderStages::FRAGMENT;
-        let array = texture(wgpu::TextureViewDimension::D2Array);
-        let layout = layout(gpu, "projective texture", &[(fragment, STORAGE), (fragment, array), (fragment, SAMPLER)]);
         let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("silhouettes"),
             mag_filter: wgpu::FilterMode::Linear,
             min_filter: wgpu::FilterMode::Linear,
             ..Default::default()
         });
+        let map = (FORMAT, texture(wgpu::TextureViewDimension::D2Array));
+        let maps = LightMaps::new(stage, options.size_texels, &[map], Some((sampler, SAMPLER)))?;
         let lit = ForwardOptions { constants: vec![("VISIBILITY", 1.0)], ..Default::default() };
         let casters = Forward::new(stage, &CONSTANT_VISIBILITY, None, lit);
-        let ground = Forward::new(stage, &PROJECTIVE_TEXTURE, Some(&layout), ForwardOptions::default());
-        let count = 6 * stage.placements().len();
-        let matrices = buffer::<Mat4>(gpu, "light matrices", count, wgpu::BufferUsages::STORAGE);
-        let silhouette = Silhouette::new(stage, 6, &SilhouetteTarget { format: FORMAT, blend: None, depth: None });
+        let ground = Forward::new(stage, &PROJECTIVE_TEXTURE, Some(&maps.layout), ForwardOptions::default());
+        let silhouette =
+            Silhouette::new(stage, MOST_VIEWS, &SilhouetteTarget { format: FORMAT, blend: None, depth: None });
         gpu.check()?;
-        Ok(Self { options, silhouette, matrices, layout, sampler, casters, ground, map: None })
-    }
-
-    fn make_map(&self, stage: &Stage, count: u32) -> (LightMap, wgpu::BindGroup) {
-        let map = LightMap::new(&stage.gpu, FORMAT, (self.options.size_texels, count));
-        let resources = [
-            self.matrices.as_entire_binding(),
-            wgpu::BindingResource::TextureView(&map.all),
-            wgpu::BindingResource::Sampler(&self.sampler),
-        ];
-        let group = group(&stage.gpu, &self.layout, &resources);
-        (map, group)
+        Ok(Self { options, silhouette, maps, casters, ground })
     }
 }
 
@@ -100,16 +80,11 @@ impl Technique for ProjectiveTexture {
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), RenderError> {
         let views = views(stage, &request.light, (self.options.size_texels, REACH_TEXELS));
-        let map = match self.map.take() {
-            Some(map) if map.0.faces.len() == views.len() => map,
-            _ => self.make_map(stage, views.len() as u32),
-        };
-        for (number, (&view, face)) in views.iter().zip(&map.0.faces).enumerate() {
+        let faces = self.maps.of_views(stage, &views).iter().flat_map(|map| &map.faces);
+        for (number, (&view, face)) in views.iter().zip(faces).enumerate() {
             let mut pass = begin(encoder, face, 0.0, None);
             self.silhouette.draw(stage, (number, view), &mut pass);
         }
-        self.map = Some(map);
-        stage.gpu.queue.write_buffer(&self.matrices, 0, bytemuck::cast_slice(&per_instance(stage, &views)));
         Ok(())
     }
 
@@ -122,20 +97,20 @@ impl Technique for ProjectiveTexture {
     ) -> Result<(), RenderError> {
         let mut pass = targets.begin(encoder, (request.options.mode, Begin::Clear));
         self.casters.draw(stage, request, targets, (&mut pass, Part::Casters));
-        pass.set_bind_group(2, self.map.as_ref().map(|(_, group)| group), &[]);
+        pass.set_bind_group(2, self.maps.group(), &[]);
         self.ground.draw(stage, request, targets, (&mut pass, Part::Ground));
         Ok(())
     }
 
     fn cost(&self, stage: &Stage) -> Cost {
-        let faces = self.map.as_ref().map_or(1, |(map, _)| map.faces.len());
+        let faces = self.maps.views();
         Cost {
             passes: 1,
             draw_calls: stage.calls_per_pass(),
             update_passes: faces,
             update_draw_calls: faces * stage.calls_of(Part::Casters),
-            texture_bytes: faces * (self.options.size_texels as usize).pow(2),
-            buffer_bytes: self.matrices.size() as usize + self.silhouette.buffer_bytes(),
+            texture_bytes: self.maps.texels(),
+            buffer_bytes: self.maps.buffer_bytes() + self.silhouette.buffer_bytes(),
             on_light_change: "the silhouette of all casters drawn again; no self-shadow".to_string(),
         }
     }

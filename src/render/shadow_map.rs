@@ -17,15 +17,14 @@
 
 use super::{
     FrameRequest, RenderError,
-    bindings::{COMPARISON, STORAGE, buffer, depth_texture, group, layout},
+    bindings::{COMPARISON, depth_texture},
     depth_pass::{DepthPass, MAP_FORMAT},
     forward::{Forward, ForwardOptions},
     gpu::SHADOW_MAP,
-    light_map::LightMap,
+    light_map::{LightMaps, MOST_VIEWS},
     light_view::views,
     stage::{Begin, Part, Stage, Targets},
     technique::{Cost, Technique},
-    view_matrices::per_instance,
 };
 use glam::Mat4;
 
@@ -47,11 +46,8 @@ pub struct ShadowMapOptions {
 pub struct ShadowMap {
     options: ShadowMapOptions,
     depth_pass: DepthPass,
-    matrices: wgpu::Buffer,
-    layout: wgpu::BindGroupLayout,
-    sampler: wgpu::Sampler,
+    maps: LightMaps,
     forward: Forward,
-    map: Option<(LightMap, wgpu::BindGroup)>,
 }
 
 impl ShadowMap {
@@ -61,11 +57,6 @@ impl ShadowMap {
     /// A size beyond the adapter's limits.
     pub fn new(stage: &Stage, options: ShadowMapOptions) -> Result<Self, RenderError> {
         let (gpu, kernel) = (&stage.gpu, options.kernel_texels);
-        LightMap::check_side(gpu, options.size_texels)?;
-        let fragment = wgpu::ShaderStages::FRAGMENT;
-        let array = depth_texture(wgpu::TextureViewDimension::D2Array);
-        let bindings = [(fragment, STORAGE), (fragment, array), (fragment, COMPARISON)];
-        let layout = layout(gpu, "shadow map", &bindings);
         let filter = if kernel == 1 { wgpu::FilterMode::Nearest } else { wgpu::FilterMode::Linear };
         let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("shadow map"),
@@ -74,25 +65,14 @@ impl ShadowMap {
             compare: Some(wgpu::CompareFunction::LessEqual),
             ..Default::default()
         });
+        let map = (MAP_FORMAT, depth_texture(wgpu::TextureViewDimension::D2Array));
+        let maps = LightMaps::new(stage, options.size_texels, &[map], Some((sampler, COMPARISON)))?;
         let constants = vec![("KERNEL", f64::from(kernel))];
         let forward =
-            Forward::new(stage, &SHADOW_MAP, Some(&layout), ForwardOptions { constants, ..Default::default() });
-        let count = 6 * stage.placements().len();
-        let matrices = buffer::<Mat4>(gpu, "light matrices", count, wgpu::BufferUsages::STORAGE);
-        let depth_pass = DepthPass::new(stage, 6, depth_bias(kernel));
+            Forward::new(stage, &SHADOW_MAP, Some(&maps.layout), ForwardOptions { constants, ..Default::default() });
+        let depth_pass = DepthPass::new(stage, MOST_VIEWS, depth_bias(kernel));
         gpu.check()?;
-        Ok(Self { options, depth_pass, matrices, layout, sampler, forward, map: None })
-    }
-
-    fn make_map(&self, stage: &Stage, count: u32) -> (LightMap, wgpu::BindGroup) {
-        let map = LightMap::new(&stage.gpu, MAP_FORMAT, (self.options.size_texels, count));
-        let resources = [
-            self.matrices.as_entire_binding(),
-            wgpu::BindingResource::TextureView(&map.all),
-            wgpu::BindingResource::Sampler(&self.sampler),
-        ];
-        let group = group(&stage.gpu, &self.layout, &resources);
-        (map, group)
+        Ok(Self { options, depth_pass, maps, forward })
     }
 
     /// Texels along a side, and how many the filter reaches beyond a lookup.
@@ -102,15 +82,10 @@ impl ShadowMap {
 
     /// Draws the casters from these views: 1, or 6 of a point light.
     pub(super) fn redraw(&mut self, stage: &Stage, views: &[Mat4], encoder: &mut wgpu::CommandEncoder) {
-        let map = match self.map.take() {
-            Some(map) if map.0.faces.len() == views.len() => map,
-            _ => self.make_map(stage, views.len() as u32),
-        };
-        for (number, (&view, face)) in views.iter().zip(&map.0.faces).enumerate() {
+        let faces = self.maps.of_views(stage, views).iter().flat_map(|map| &map.faces);
+        for (number, (&view, face)) in views.iter().zip(faces).enumerate() {
             self.depth_pass.record(stage, (number, view), face, encoder);
         }
-        self.map = Some(map);
-        stage.gpu.queue.write_buffer(&self.matrices, 0, bytemuck::cast_slice(&per_instance(stage, views)));
     }
 }
 
@@ -147,20 +122,20 @@ impl Technique for ShadowMap {
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), RenderError> {
         let mut pass = targets.begin(encoder, (request.options.mode, Begin::Clear));
-        pass.set_bind_group(2, self.map.as_ref().map(|(_, group)| group), &[]);
+        pass.set_bind_group(2, self.maps.group(), &[]);
         self.forward.draw(stage, request, targets, (&mut pass, Part::All));
         Ok(())
     }
 
     fn cost(&self, stage: &Stage) -> Cost {
-        let faces = self.map.as_ref().map_or(1, |(map, _)| map.faces.len());
+        let faces = self.maps.views();
         Cost {
             passes: 1,
             draw_calls: stage.calls_per_pass(),
             update_passes: faces,
             update_draw_calls: faces * stage.calls_per_pass(),
-            texture_bytes: 4 * faces * (self.options.size_texels as usize).pow(2),
-            buffer_bytes: self.matrices.size() as usize + self.depth_pass.buffer_bytes(),
+            texture_bytes: 4 * self.maps.texels(),
+            buffer_bytes: self.maps.buffer_bytes() + self.depth_pass.buffer_bytes(),
             on_light_change: "all casters drawn into the map again".to_string(),
         }
     }

@@ -18,21 +18,19 @@
 
 use super::{
     FrameRequest, RenderError,
-    bindings::{STORAGE, buffer, depth_texture, group, layout, texture},
+    bindings::{depth_texture, texture},
     depth_pass::{DepthPass, MAP_FORMAT},
     forward::{Forward, ForwardOptions},
     gpu::SILHOUETTE_MAP,
-    light_map::LightMap,
+    light_map::{LightMaps, MOST_VIEWS},
     light_view::views,
     shadow_map::depth_bias,
     silhouette_points::{POINT_FORMAT, SilhouettePoints},
     stage::{Begin, Part, Stage, Targets},
     technique::{Cost, Technique},
-    view_matrices::per_instance,
     volume::Casters,
 };
 use crate::scene::Scene;
-use glam::Mat4;
 use shadowfit_solver::mesh::Frame;
 
 /// A fragment's neighbour texel may be a texel off its own, whose far corner is another one off.
@@ -47,18 +45,9 @@ pub struct SilhouetteMap {
     size_texels: u32,
     depth_pass: DepthPass,
     points: SilhouettePoints,
-    matrices: wgpu::Buffer,
-    layout: wgpu::BindGroupLayout,
+    /// Of depth, and of points.
+    maps: LightMaps,
     forward: Forward,
-    maps: Option<Maps>,
-}
-
-/// One layer a view.
-#[derive(Debug)]
-struct Maps {
-    depth: LightMap,
-    points: LightMap,
-    group: wgpu::BindGroup,
 }
 
 impl SilhouetteMap {
@@ -69,31 +58,15 @@ impl SilhouetteMap {
     /// A size beyond the adapter's limits.
     pub fn new(stage: &Stage, scene: &Scene, frame: &Frame, size_texels: u32) -> Result<Self, RenderError> {
         let gpu = &stage.gpu;
-        LightMap::check_side(gpu, size_texels)?;
-        let fragment = wgpu::ShaderStages::FRAGMENT;
         let array = wgpu::TextureViewDimension::D2Array;
-        let bindings = [(fragment, STORAGE), (fragment, depth_texture(array)), (fragment, texture(array))];
-        let layout = layout(gpu, "silhouette map", &bindings);
-        let forward = Forward::new(stage, &SILHOUETTE_MAP, Some(&layout), ForwardOptions::default());
-        let count = 6 * stage.placements().len();
-        let matrices = buffer::<Mat4>(gpu, "light matrices", count, wgpu::BufferUsages::STORAGE);
-        let depth_pass = DepthPass::new(stage, 6, depth_bias(KERNEL_TEXELS));
+        let maps = [(MAP_FORMAT, depth_texture(array)), (POINT_FORMAT, texture(array))];
+        let maps = LightMaps::new(stage, size_texels, &maps, None)?;
+        let forward = Forward::new(stage, &SILHOUETTE_MAP, Some(&maps.layout), ForwardOptions::default());
+        let depth_pass = DepthPass::new(stage, MOST_VIEWS, depth_bias(KERNEL_TEXELS));
         let (casters, _) = Casters::of_scene(scene, frame, |_| 0);
         let points = SilhouettePoints::new(stage, casters, size_texels);
         gpu.check()?;
-        Ok(Self { size_texels, depth_pass, points, matrices, layout, forward, maps: None })
-    }
-
-    fn make_maps(&self, stage: &Stage, count: u32) -> Maps {
-        let map = |format| LightMap::new(&stage.gpu, format, (self.size_texels, count));
-        let (depth, points) = (map(MAP_FORMAT), map(POINT_FORMAT));
-        let resources = [
-            self.matrices.as_entire_binding(),
-            wgpu::BindingResource::TextureView(&depth.all),
-            wgpu::BindingResource::TextureView(&points.all),
-        ];
-        let group = group(&stage.gpu, &self.layout, &resources);
-        Maps { depth, points, group }
+        Ok(Self { size_texels, depth_pass, points, maps, forward })
     }
 }
 
@@ -109,16 +82,11 @@ impl Technique for SilhouetteMap {
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), RenderError> {
         let views = views(stage, &request.light, (self.size_texels, REACH_TEXELS));
-        let maps = match self.maps.take() {
-            Some(maps) if maps.depth.faces.len() == views.len() => maps,
-            _ => self.make_maps(stage, views.len() as u32),
-        };
-        for (number, (&view, face)) in views.iter().zip(&maps.depth.faces).enumerate() {
+        let [depth, points] = self.maps.of_views(stage, &views) else { return Ok(()) };
+        for (number, (&view, face)) in views.iter().zip(&depth.faces).enumerate() {
             self.depth_pass.record(stage, (number, view), face, encoder);
         }
-        self.points.record(stage, (&views, &request.light), (&maps.depth, &maps.points), encoder)?;
-        self.maps = Some(maps);
-        stage.gpu.queue.write_buffer(&self.matrices, 0, bytemuck::cast_slice(&per_instance(stage, &views)));
+        self.points.record(stage, (&views, &request.light), (depth, points), encoder)?;
         Ok(())
     }
 
@@ -130,7 +98,7 @@ impl Technique for SilhouetteMap {
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), RenderError> {
         let mut pass = targets.begin(encoder, (request.options.mode, Begin::Clear));
-        pass.set_bind_group(2, self.maps.as_ref().map(|maps| &maps.group), &[]);
+        pass.set_bind_group(2, self.maps.group(), &[]);
         self.forward.draw(stage, request, targets, (&mut pass, Part::All));
         Ok(())
     }
@@ -138,15 +106,14 @@ impl Technique for SilhouetteMap {
     fn cost(&self, stage: &Stage) -> Cost {
         // Depth in 4 bytes and a point in 2.
         const TEXEL_BYTES: usize = 6;
-        let faces = self.maps.as_ref().map_or(1, |maps| maps.depth.faces.len());
-        let texels = faces * (self.size_texels as usize).pow(2);
-        let buffers = [self.matrices.size() as usize, self.depth_pass.buffer_bytes(), self.points.buffer_bytes()];
+        let faces = self.maps.views();
+        let buffers = [self.maps.buffer_bytes(), self.depth_pass.buffer_bytes(), self.points.buffer_bytes()];
         Cost {
             passes: 1,
             draw_calls: stage.calls_per_pass(),
             update_passes: 2 * faces,
             update_draw_calls: faces * (stage.calls_per_pass() + 1),
-            texture_bytes: TEXEL_BYTES * texels + self.points.texture_bytes(),
+            texture_bytes: TEXEL_BYTES * self.maps.texels() + self.points.texture_bytes(),
             buffer_bytes: buffers.iter().sum(),
             on_light_change:
                 "all casters drawn into the map again; each instance's silhouette found on the CPU and drawn"
