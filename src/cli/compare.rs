@@ -3,11 +3,11 @@
 use super::{CliError, Preset, progress_bar};
 use crate::{
     comparison::{self, CompareOptions, Family},
-    pipeline::FitRequest,
+    pipeline::{FitRequest, stem_of},
 };
 use clap::{Args, ValueEnum};
 use shadowfit_solver::lights::LightDomain;
-use std::path::PathBuf;
+use std::{collections::BTreeSet, path::PathBuf};
 
 #[derive(Debug, Args)]
 pub(super) struct CompareArgs {
@@ -59,6 +59,11 @@ pub(super) fn compare(args: &CompareArgs, command: &str) -> Result<(), CliError>
         frames: usize::from(args.frames),
         instances: args.instances.iter().map(|&n| usize::from(n)).filter(|&n| n > 0).collect(),
     };
+    let mut names = BTreeSet::new();
+    if let Some(model) = args.models.iter().find(|model| !names.insert(stem_of(model))) {
+        let name = stem_of(model);
+        return Err(CliError::Usage(format!("two models are called {name}: their tables would lie in the same files")));
+    }
     for model in &args.models {
         let request = FitRequest {
             model: model.clone(),

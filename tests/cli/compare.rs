@@ -80,6 +80,8 @@ fn an_asset_is_not_fitted_again_and_no_instances_are_no_test() {
 #[test]
 fn unknown_techniques_and_missing_models_are_refused() {
     let folder = tempfile::tempdir().unwrap();
+    let twice = model("plate_over_ground");
+    compare(folder.path(), &[twice.to_str().unwrap()]).refused(1, &["two models", "plate_over_ground"]);
     compare(folder.path(), &["--techniques", "candles"]).refused(1, &["candles", "shadow-map"]);
     let missing = folder.path().join("missing.glb");
     run(&["compare", missing.to_str().unwrap(), "-o", folder.path().to_str().unwrap()]).refused(2, &["missing.glb"]);
